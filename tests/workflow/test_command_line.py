@@ -68,7 +68,6 @@ def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tm
         assert Path(path).stat().st_size > 20_000
     again = creepkit("run", path, "--to", tmp_path / "again", "--only", "quality")
     assert again.exit_code == 0, again.output
-    assert "all numbers are those of" in again.stdout
 
 
 def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):

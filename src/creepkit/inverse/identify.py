@@ -75,7 +75,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import UNRELATED_RATES, WorkingNoiseEstimator, with_single_value_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance
 
@@ -93,10 +93,6 @@ CLEARLY = 1.2
 
 DESCRIBING_LIMITS = APPROXIMATE_LIMITS._replace(rounds=8)
 """For values by frames of equal weight, which follow the noise that is found slowly."""
-
-
-UNRELATED_RATES = 0.7
-"""Scatter of ln rate, a factor of two between tests, from which on a law describes none of them."""
 
 
 @kept_where_asked

@@ -206,6 +206,8 @@ class RateExplanations:
         if abs(change) > SMALLEST_CHANGE["stress exponent"]:
             exponent, u = local_exponent(self.problem.coordinates, stress), self.x[: self.problem.parameter_count]
             ends = float(exponent(u)), float(exponent(self._moved(evidence))) + change
+            if abs(ends[1] - ends[0]) < SMALLEST_CHANGE["stress exponent"]:
+                return  # values follow the rates already
             yield Explanation("stress exponent", (), change, sd, odds, ends, (stress, stress))
 
     @cached_property

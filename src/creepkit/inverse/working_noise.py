@@ -25,6 +25,7 @@ from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES, S
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import (
+    LARGEST_RATE_SCATTER,
     LONGEST_DRIFT,
     LinearisedProblem,
     estimate_variance_components,
@@ -66,6 +67,10 @@ INITIAL_SINGLE_VALUE_SD = 0.3
 """Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
 
+UNRELATED_RATES = 0.95 * LARGEST_RATE_SCATTER
+"""Scatter of ln rate, near the largest that is looked for, from which on the rates of tests say nothing of a law."""
+
+
 class WorkingNoiseEstimator:
     """How the working noise follows from the settings: by likelihood, or by the weights of outputs."""
 
@@ -100,7 +105,12 @@ class WorkingNoiseEstimator:
         """The noise model of largest restricted likelihood at the end: the working noise itself where values are."""
         if self.by_likelihood:
             return working_noise
-        return self._by_restricted_likelihood(linearised, self._likely_start(len(linearised.residuals.values)))
+        start = self._likely_start(len(linearised.residuals.values))
+        found = self._by_restricted_likelihood(linearised, start)
+        if found.rate < UNRELATED_RATES:
+            return found
+        # rates that share nothing set values free to follow the bend of curves: the noise is that about these values
+        return self._by_restricted_likelihood(replace(linearised, free=np.zeros_like(linearised.free)), start)
 
     def _likely_start(self, tests: int) -> NoiseModel:
         nuisances, by_output = self.settings.nuisances, {}

@@ -128,8 +128,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
         by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
-    kinds = [one.kind.replace("_", " ") for one in fit.unmodelled if one.included]
-    included = f"with errors of {', '.join(dict.fromkeys(kinds))}" if kinds else ""
+    included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
 
 

@@ -140,7 +140,11 @@ def test_straight_lines_under_load_have_the_exponent_of_their_rates():
         times = np.linspace(0.05, 1.0, 20) * 0.02 / rate
         strain = rate * times * np.exp(0.003 * rng.standard_normal(20))
         tests.append(History(f"{stress:g}", times, {"strain": strain}, ck.constant_stress(stress), 900.0))
-    assert ck.identify("norton", tests).values["n"] == pytest.approx(4.0, abs=0.05)
+    fit = ck.identify("norton", tests)
+    (exponent,) = (one for one in fit.estimates if one.name == "n")
+    assert exponent.value == pytest.approx(4.0, abs=0.05)
+    assert 2.0 < exponent.low < 4.0 < exponent.high < 6.0
+    assert "by the rates" not in fit.headline
 
 
 def test_noise_of_a_smooth_sparse_curve_is_small():
