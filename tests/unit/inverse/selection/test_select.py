@@ -88,7 +88,7 @@ def test_the_criteria_are_their_formulas(ranking):
 
 
 def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
-    """Creep strain grows a thousandfold over a test: hardening by m changes rates by 1000^m beside the same stresses."""
+    """Creep strain grows a thousandfold over a test: hardening by m changes rates by 1000^m."""
     ranking = ck.select(
         LAWS[:2], measured("norton", {"A": 1e-16, "n": 4.2}, seed=2), "uniaxial", nuisances=[], starts=3
     )
