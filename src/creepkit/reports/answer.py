@@ -393,13 +393,14 @@ def line_of_group(fit: Identification) -> str:
 
 def chosen_text(ranking: Ranking) -> str:
     """Whether the choice of the law is decisive, and the weights of the laws; cautions say why one is not."""
-    known = [f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED] if one.weight >= LEAST_WEIGHT]
-    more = len(ranking.laws) - len(known)
-    decided = "decisive" if ranking.decisive else "not decisive"
-    if len(known) == 1:
-        return f"{decided}; weight {ranking.laws[0].weight:.2f} among {plural(len(ranking.laws), 'law')}"
+    laws, same = [one for one in ranking.laws if not one.same_as], ranking.same_functions
+    known = [f"{one.fit.law.name} {one.weight:.2f}" for one in laws[:MOST_NAMED] if one.weight >= LEAST_WEIGHT]
+    more = len(laws) - len(known)
     others = f"; {plural(more, 'other')} below {LEAST_WEIGHT:g}" if more else ""
-    return f"{decided}; weights: {', '.join(known)}{others}"
+    weights = f"weights: {', '.join(known)}{others}"
+    if len(known) == 1:
+        weights = f"weight {laws[0].weight:.2f} among {plural(len(laws), 'law')}"
+    return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}{same and f'; {same}'}"
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------

@@ -82,7 +82,7 @@ def _table(ranking: Ranking) -> Table:
             ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
             scatter_of_rates(one.fit),
             number(one.excess, 3),
-            f"{one.weight:.3f}",
+            f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
             explanation(one.fit),
         )
