@@ -367,10 +367,14 @@ GAROFALO = "Garofalo (1965), Fundamentals of Creep and Creep-Rupture in Metals, 
 
 def with_primary(law: Law) -> Law:
     """Multiply the rates of all terms by 1 + b exp(-strain / e_p); see CreepLaw.with_primary."""
-    if law.states or any(term.has(strain, time) for term in law.terms.values()):
+    name, title = f"{law.name}*primary", f"{law.title or law.name} with primary creep"
+    for symbol, param in law.params.items():
+        if law.states and param.off is not None and any(one.has(time**symbol) for one in law.terms.values()):
+            law = _substituted(law, {symbol: sympy.Float(param.off)}, law.name, law.title)  # hardens by strain then
+    if any(term.has(strain, time) for term in law.terms.values()):
         raise LawError(
-            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress and "
-            "temperature alone, such as law('hyperbolic-sine')"
+            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress, "
+            "temperature and damage alone, such as law('hyperbolic-sine')"
         )
     b = Symbol(unused_name("b", set(law.names)))
     e_p = Symbol(unused_name("e_p", set(law.names)))
@@ -381,8 +385,8 @@ def with_primary(law: Law) -> Law:
     factor = 1 + b * sympy.exp(-strain / e_p)
     return replace(
         law,
-        name=f"{law.name}*primary",
-        title=f"{law.title or law.name} with primary creep",
+        name=name,
+        title=title,
         terms={label: term * factor for label, term in law.terms.items()},
         params={**law.params, **params},
         references=tuple(dict.fromkeys((*law.references, GAROFALO))),

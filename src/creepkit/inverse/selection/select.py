@@ -122,7 +122,7 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
-    sums = [laws[0] + other for other in laws[1:]]
+    sums = [laws[0] + other for other in laws[1:] if not (laws[0].states and other.states)]  # a piece breaks once
     free = {name for law in laws for name in law.names}
     fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}
     suited = [_with_fixed(law, fixed) for law in suited]
