@@ -153,7 +153,6 @@ def _after(fit: Identification, conditions: Floats) -> Identification:
         members={level: (*names, *names[-1:] * count) for level, names in scatter.members.items()},
         log_factor=np.append(scatter.log_factor, np.zeros(count)),
         variance=np.append(scatter.variance, np.full(count, scatter.variance.min())),
-        weight=np.append(scatter.weight, np.ones(count)),
         design=np.concatenate([scatter.design, rows]),
         stresses=np.append(scatter.stresses, conditions[0]),
         temperatures=np.append(scatter.temperatures, conditions[1]),

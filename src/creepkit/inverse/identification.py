@@ -226,7 +226,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
     def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:
         """Residuals of a problem of these tests at the optimum, with the weights of tests."""
-        return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
+        return problem.residuals(self.x)
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
         """Value and 95 % interval of a quantity, of ln rate with what the law misses there; point : {name: (...,)}."""

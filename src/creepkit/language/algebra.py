@@ -367,7 +367,6 @@ GAROFALO = "Garofalo (1965), Fundamentals of Creep and Creep-Rupture in Metals, 
 
 def with_primary(law: Law) -> Law:
     """Multiply the rates of all terms by 1 + b exp(-strain / e_p); see CreepLaw.with_primary."""
-    name, title = f"{law.name}*primary", f"{law.title or law.name} with primary creep"
     for symbol, param in law.params.items():
         if law.states and param.off is not None and any(one.has(time**symbol) for one in law.terms.values()):
             law = _substituted(law, {symbol: sympy.Float(param.off)}, law.name, law.title)  # hardens by strain then
@@ -376,20 +375,33 @@ def with_primary(law: Law) -> Law:
             f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress, "
             "temperature and damage alone, such as law('hyperbolic-sine')"
         )
-    b = Symbol(unused_name("b", set(law.names)))
-    e_p = Symbol(unused_name("e_p", set(law.names)))
     params = {
-        b: Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
-        e_p: Param("strain over which primary creep fades", bounds=(1e-5, 0.05), scale="log", unit="1"),
+        Symbol("b"): Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
+        Symbol("e_p"): Param("strain over which primary creep fades", bounds=(1e-5, 0.05), scale="log", unit="1"),
     }
-    factor = 1 + b * sympy.exp(-strain / e_p)
+    b, e_p = params
+    return multiplied(law, "primary creep", 1 + b * sympy.exp(-strain / e_p), params, GAROFALO, name="primary")
+
+
+def multiplied(
+    law: Law,
+    title: str,
+    factor: sympy.Expr,
+    params: Mapping[sympy.Symbol, Param],
+    reference: str,
+    *,
+    name: str | None = None,
+) -> Law:
+    """Multiply the rates of all terms by a factor; where a name of its parameters is taken, that one is numbered."""
+    taken = set(law.names)
+    names = {symbol: Symbol(unused_name(symbol.name, taken)) for symbol in params}
     return replace(
         law,
-        name=name,
-        title=title,
-        terms={label: term * factor for label, term in law.terms.items()},
-        params={**law.params, **params},
-        references=tuple(dict.fromkeys((*law.references, GAROFALO))),
+        name=f"{law.name}*{name or title.replace(' ', '-')}",
+        title=f"{law.title or law.name} {'and' if ' with ' in law.title else 'with'} {title}",
+        terms={label: term * factor.xreplace(names) for label, term in law.terms.items()},
+        params={**law.params, **{names[symbol]: param for symbol, param in params.items()}},
+        references=tuple(dict.fromkeys((*law.references, reference))),
         examples=(),
     )
 

@@ -19,6 +19,7 @@ from functools import cache
 import sympy
 
 from creepkit.language import CreepLaw, Param, arrhenius, parameters, strain, stress, time
+from creepkit.language.algebra import multiplied
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -157,34 +158,19 @@ def _law_of_product(product: Product) -> CreepLaw:
         other = built_in[product.hardening]
         m = other.symbol("m")
         variable = strain if product.hardening == "strain power" else time
-        law = _multiplied(law, product.hardening, variable**m, {m: other.params[m]}, other.references[0])
+        law = multiplied(law, product.hardening, variable**m, {m: other.params[m]}, other.references[0])
     elif product.hardening == "time saturation":
         table = {
             b: Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
             t_p: Param("time over which primary creep fades", bounds=(1e2, 1e8), scale="log", unit="s"),
         }
         reference = "Andrade (1910), Proc. R. Soc. A 84, 1; Garofalo (1965), Fundamentals of Creep"
-        law = _multiplied(law, product.hardening, 1 + b * sympy.exp(-time / t_p), table, reference)
+        law = multiplied(law, product.hardening, 1 + b * sympy.exp(-time / t_p), table, reference)
     if product.softening == "strain":
         table = {Omega: Param("acceleration by strain", unit="1", bounds=(0.5, 500.0), scale="log")}
         reference = "Prager (1995), J. Pressure Vessel Technol. 117, 95"
-        law = _multiplied(law, "softening", sympy.exp(Omega * strain), table, reference)
+        law = multiplied(law, "softening", sympy.exp(Omega * strain), table, reference)
     return law
-
-
-def _multiplied(
-    law: CreepLaw, name: str, factor: sympy.Expr, table: Mapping[sympy.Symbol, Param], reference: str
-) -> CreepLaw:
-    """A law of one term times a factor of strain or time."""
-    return replace(
-        law,
-        name=f"{law.name}*{name.replace(' ', '-')}",
-        title=f"{law.title} {'and' if ' with ' in law.title else 'with'} {name}",
-        terms={label: term * factor for label, term in law.terms.items()},
-        params={**law.params, **table},
-        references=tuple(dict.fromkeys((*law.references, reference))),
-        examples=(),
-    )
 
 
 def operations(law: CreepLaw) -> int:

@@ -381,12 +381,13 @@ def line_of_group(fit: Identification) -> str:
 
 def chosen_text(ranking: Ranking) -> str:
     """Whether the choice of the law is decisive, and the weights of the laws; weights do not say why one is not."""
-    weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
-    more = len(ranking.laws) - MOST_NAMED
+    laws, same = [one for one in ranking.laws if not one.same_as], ranking.same_functions
+    weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in laws[:MOST_NAMED])
+    more = len(laws) - MOST_NAMED
     decided = "decisive" if ranking.decisive else "not decisive"
     if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
         decided += f", {'but' if ranking.decisive else 'for'} the tests allow {ranking.challenges[0].subject} as well"
-    return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
+    return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}{same and f'; {same}'}"
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------

@@ -244,20 +244,18 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
-                number(test.weight, 2),
                 *_single_cells(None if first is not None else test.minimum_rate),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "weight", "minimum rate, 1/s", "by the law", "law / measured"),
+        *("rate × law", "minimum rate, 1/s", "by the law", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
     caption = (
         f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
-        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture. Weight in the "
-        "fit: 1 as any other, less for one far from the others"
+        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture"
     )
     if any(t.minimum_rate or t.rupture for t in fit.tests):
         caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"

@@ -80,7 +80,7 @@ def _table(ranking: Ranking) -> Table:
             str(len(one.fit.law.params)),
             *_misfit(one.fit),
             number(one.excess, 3),
-            f"{one.weight:.3f}",
+            f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
             explanation(one.fit),
         )

@@ -20,12 +20,18 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance, usual_errors
+from creepkit.inverse.selection.discrimination import (
+    DISTINGUISHABLE_CHI_SQUARE,
+    CommonCovarianceFits,
+    RatesOverTests,
+    under_common_covariance,
+    usual_errors,
+)
 from creepkit.records import Nuisance, is_length_nuisance
 
 MOST_NAMED = 2
@@ -58,21 +64,22 @@ Scope = Literal["test", "all"]
 class Trial:
     """The laws with one perturbation. scope : whether it is independent in each test, or one of all tests.
 
-    effects : it, by each law. scores, weights : (laws,) -2 ln of the evidence by BIC, and the weights by it.
-    noise_model : of the common covariance.
+    effects : it, by each law. scores : (laws,) -2 ln of the evidence by BIC. u : of each law (parameters,) coordinates
+    where it fits best. noise_model : of the common covariance.
     """
 
     scope: Scope
     effects: tuple[Perturbation, ...]
     scores: Floats
-    weights: Floats
+    u: tuple[Floats, ...]
     noise_model: NoiseModel
 
     @classmethod
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
-        scores, noise_model = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
-        return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
+        scores, common = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
+        u = tuple(fit.u + step[: fit.u.size] for fit, step in zip(fits, common.steps, strict=True))
+        return cls(scope, effects, scores, u, fits[common.reference_law].noise_model)
 
     @property
     def is_of_length(self) -> bool:
@@ -90,8 +97,8 @@ class Trial:
         return _description(self, fits[law], law, self.sizes(fits, law))
 
 
-def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, NoiseModel]:
-    """(laws,) -2 ln of the evidence by BIC of identifications, and the noise model it is under.
+def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, CommonCovarianceFits]:
+    """(laws,) -2 ln of the evidence by BIC of identifications, and the fits under one covariance that it is of.
 
     tried : a perturbation by each law, beside the usual errors of tests, and in the place of one of its kind.
     """
@@ -100,7 +107,7 @@ def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) 
         errors = [[*(e for e in own if e.kind != new.kind), new] for own, new in zip(errors, tried, strict=True)]
     common = under_common_covariance(fits, errors)
     penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
-    return common.chi_square + common.log_determinant + penalties, fits[common.reference_law].noise_model
+    return common.chi_square + common.log_determinant + penalties, common
 
 
 def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
@@ -141,12 +148,14 @@ def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
 def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The perturbations, one by one, with which the first law no longer has nearly all the weight."""
     challenges: dict[str, tuple[float, Challenge]] = {}
+    rates = RatesOverTests(fits)
     for trial in _trials(fits):
-        effect, weight = trial.effects[0], float(trial.weights[0])
+        weights = rates.weights(rates.standing(trial.u, trial.scores), trial.scores)
+        effect, weight = trial.effects[0], float(weights[0])
         if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
             continue
-        rival = 1 + int(np.argmax(trial.weights[1:]))
-        name, weight_of_rival = fits[rival].law.name, f"{trial.weights[rival]:.2f}"
+        rival = 1 + int(np.argmax(weights[1:]))
+        name, weight_of_rival = fits[rival].law.name, f"{weights[rival]:.2f}"
         sentence = (
             f"with {trial.description(fits, rival)} {name} would explain them (weight {weight_of_rival})"
             if _explains_with(fits[rival], trial.effects[rival])
