@@ -80,10 +80,11 @@ def select(
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
-    ranking = rank(fits, criterion, failed)
+    ranking = rank(fits, criterion, failed, further=tried_further)
     if not ranking.best.converged:
         best = _repeated(ranking.best, using, settings, through)
-        ranking = rank([best if fit is ranking.best else fit for fit in fits], criterion, failed)
+        fits = [best if fit is ranking.best else fit for fit in fits]
+        ranking = rank(fits, criterion, failed, further=tried_further)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)
