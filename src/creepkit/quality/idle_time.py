@@ -80,7 +80,8 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
     sigma = max(noise_of_readings(values), rounding_step(values))
     found: list[tuple[float, IdlePart]] = []
     rates_over = cache(partial(_rates, times, values, sigma))
-    falls = np.append(0, np.cumsum(np.diff(values) < -FALL_THRESHOLD * sigma))
+    noise = max(noise_of_readings(values, times, order=3), rounding_step(values))
+    falls = np.append(0, np.cumsum(np.diff(values) < -FALL_THRESHOLD * noise))
     for width in WIDTHS:
         beside = max(FRAMES_BESIDE, width // 2)
         first = np.arange(beside, times.size - beside - width)
