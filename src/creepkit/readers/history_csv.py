@@ -128,7 +128,8 @@ def _refuse_one_for_all(tests: Sequence[TabulatedTest], vocabulary: HeaderVocabu
     """HistoryError where an answer for a file states one value, and the names and titles of its tests several."""
     for key, (text, place) in vocabulary.stated.items():
         found = split_unit(key, vocabulary.terms().conditions.kinds)
-        said = dict.fromkeys(one.text for test in tests for one in test.table.sources if found and one.key == found[0])
+        of_tests = ([one.text for one in test.table.sources if found and one.key == found[0]] for test in tests)
+        said = dict.fromkeys(texts[0] for texts in of_tests if texts)
         if len(said) > 1:
             several = " and ".join([*map(quoted, list(said)[:3]), *["others"] * (len(said) > 3)])
             what = f"{key} {text} would hold for all tests of '{tests[0].table.path.name}', which say {several}"

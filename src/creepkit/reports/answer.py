@@ -260,6 +260,10 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
     return _said("held", law=law, name=name, value=number(bound), end=end, wider=wider)
 
 
+RUNAWAY = 1.0
+"""Strain above what was measured, from which on a law has broken before the test."""
+
+
 def _said(kind: str, **values: object) -> str:
     return CAUTIONS[kind].format(**values)
 
@@ -285,7 +289,8 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
-        yield _said("worst", test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
+        kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
+        yield _said(kind, test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
         yield _said("remedy", remedy=adequacy.remedies[0])
     yield from (_said("implausible", nuisance=one.description) for one in adequacy.implausible[:1])
