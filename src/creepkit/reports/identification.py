@@ -291,8 +291,7 @@ def _sums(fit: Identification) -> list[str]:
 
 def _if_the_law_holds(fit: Identification) -> str:
     """The condition of intervals of single tests."""
-    contradicted = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
-    return ", which they do not have: the tests contradict the law" if contradicted else ", if the law holds"
+    return ", which they do not have: the tests contradict the law" if rejected(fit) else ", if the law holds"
 
 
 def _without_misfit(fit: Identification) -> list[str]:

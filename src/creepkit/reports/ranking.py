@@ -18,6 +18,7 @@ from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
 from creepkit.reports.identification import scatter_of_rates
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
@@ -78,7 +79,8 @@ def _table(ranking: Ranking) -> Table:
         (
             titled_law(one.fit.law),
             str(len(one.fit.law.params)),
-            *_misfit(one.fit),
+            ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
+            scatter_of_rates(one.fit),
             number(one.excess, 3),
             f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
@@ -87,10 +89,10 @@ def _table(ranking: Ranking) -> Table:
         for one in ranking.laws
     ]
     columns = (
-        *("law", "parameters", _misfit_name(ranking.best), "test to test", f"{criterion_name(ranking)} - best"),
+        *("law", "parameters", "mean misfit", "test to test", f"{criterion_name(ranking)} - best"),
         *("weight", "chi-square", "by the noise of the tests"),
     )
-    return Table("laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5, 6))
+    return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
 
 
 def explanation(fit: Identification) -> str:
@@ -101,28 +103,6 @@ def explanation(fit: Identification) -> str:
 def criterion_name(ranking: Ranking) -> str:
     """The abbreviation of the criterion by which laws are ranked."""
     return {"bic": "BIC", "aicc": "AICc"}[ranking.criterion]
-
-
-def _misfit_name(fit: Identification) -> str:
-    """What _misfit says first: of the first output, else of minimum rates, else of rupture times."""
-    if fit.errors:
-        output = next(iter(fit.errors))
-        return f"rms ln {output}" if is_logarithmic(output) else f"error of {output}"
-    return f"rms ln {'minimum rate' if any(m.minimum_rate for m in fit.tests) else 'rupture time'}"
-
-
-def _misfit(fit: Identification) -> tuple[str, str]:
-    """The misfit of the first output, or of tests without frames, and the scatter of rates between tests."""
-    if fit.errors:
-        output = next(iter(fit.errors))
-        return f"{fit.rms:.3f}" if is_logarithmic(output) else (
-            f"{fit.errors[output].relative_squared_error:.3g}"
-        ), scatter_of_rates(fit)
-    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
-    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
-    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
-    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
-    return f"{rms:.3f}", scatter_of_rates(fit)
 
 
 def separating_test(ranking: Ranking) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, ends, plural
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, ends, plural, plural_of
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.rupture_assessment.checks import BAND_FACTOR
@@ -50,7 +50,7 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     """The tests, the verdict, and the strengths of the average method in a table."""
     tests = assessment.tests
     span = f"{ends(tests.stress)} MPa, {ends(tests.temperature - ZERO_CELSIUS)} °C"
-    heats = "".join(f", {len(set(v))} {_plural(group)}" for group, v in tests.groups.items())
+    heats = "".join(f", {len(set(v))} {plural_of(group)}" for group, v in tests.groups.items())
     head = (
         f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
         f"{10 ** float(tests.log_time.max()):.4g} h{heats}"
@@ -84,7 +84,7 @@ def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = 
     best, relation, groups = assessment.best, assessment.relation, assessment.tests.groups
     columns = (
         *("method", "weight", "BIC - best", "scatter of a test"),
-        *(f"between {_plural(group)}" for group in groups),
+        *(f"between {plural_of(group)}" for group in groups),
     )
     rows = [
         (
@@ -122,10 +122,6 @@ def check_text(check: AssessmentCheck) -> str:
     return f"{PASSED[check.passed]}: {named}; {check.found}"
 
 
-def _plural(group: str) -> str:
-    return "laboratories" if group == "laboratory" else f"{group}s"
-
-
 def _constants(fit: RuptureFit) -> Table:
     given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
     rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}", p.unit) for p in fit.parameters]
@@ -142,7 +138,7 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
         ordered = [f"{name} {10 ** effects[name]:.2f}" for name in sorted(effects, key=lambda name: effects[name])]
         if len(ordered) > 2 * SHOWN_EFFECTS:
             ordered = [*ordered[:SHOWN_EFFECTS], "...", *ordered[-SHOWN_EFFECTS:]]
-        lines.append(f"times of {_plural(group)} over those of the average one: {', '.join(ordered)}")
+        lines.append(f"times of {plural_of(group)} over those of the average one: {', '.join(ordered)}")
     return lines
 
 
@@ -173,7 +169,7 @@ def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
     if not assessment.tests.groups:
         note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
     elif not scattering:
-        groups = " and ".join(map(_plural, assessment.tests.groups))
+        groups = " and ".join(map(plural_of, assessment.tests.groups))
         note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
     columns = [*heads, "of one test", "remarks"]
     caption = "creep rupture strengths in MPa, with bounds in brackets"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.errors import FitError
+from creepkit.reports.answer import interval_text
 from creepkit.reports.blocks import aligned
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
@@ -70,16 +70,11 @@ def _table_row(plate: ScreeningResult, result: AlloyResult) -> tuple[str, ...]:
         *first_cells,
         names,
         f"{result.laws[0].weight:.2f}",
-        _interval_text(fit.rate(COMPARISON_STRESS, warn=False), 3),
-        _interval_text(fit.local_exponent(COMPARISON_STRESS, warn=False), 3),
+        interval_text(tuple(map(float, fit.rate(COMPARISON_STRESS, warn=False)))),
+        interval_text(tuple(map(float, fit.local_exponent(COMPARISON_STRESS, warn=False)))),
         f"{mean_chi_square(fit):.3g}",
         confirmation_text(result),
     )
-
-
-def _interval_text(interval: Sequence[Any], digits: int) -> str:
-    value, low, high = (float(v) for v in interval)
-    return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"
 
 
 def _failure_text(alloy: str, failure: str) -> str:

@@ -7,21 +7,23 @@ the result puts in.
 from __future__ import annotations
 
 HEADLINES = {
-    "use": "use {law} for {good}{where}; {truth}",
-    "use in part": "use {law} for {good}, not {bad}{where}; {truth}",
-    "use nothing": "do not use {law}: {bad} at best; {truth}",
+    "use": "use {law} for {good}; {truth}",
+    "use in part": "use {law} for {good}, not {bad}; {truth}",
+    "between": "use {law} between the tests only, for {good}; {truth}",
+    "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
+    "use nothing": "do not use {law}: it misses {bad}; {truth}",
     "fitted": "{law} was fitted; {truth}",
     "not found": "do not use {law} yet: the search for its values did not converge{described}",
 }
-"""{kind: the first line of an answer}. where : the range of the tests."""
+"""{kind: the first line of an answer}."""
 
 
 TRUTHS = {
     "not judged": "whether it is the true law cannot be judged",
     "explains": "the tests do not contradict it",
-    "explained": "but {cause}",
-    "two exponents": "but by it minimum rates contradict rupture times",
-    "shape": "but curves differ in shape",
+    "explained": "{cause}",
+    "two exponents": "by it minimum rates contradict rupture times",
+    "shape": "curves differ in shape",
     "noise": "the tests differ from it by more than their noise",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
@@ -51,16 +53,25 @@ NEXT = {
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
     "law": "try {law} as well, for {why}",
     "laws": "compare it with other laws that suit the tests (creepkit init)",
-    "within": "use it between the tests only: beyond them its misfit grows",
+    "search laws": "search laws that nobody wrote down (creepkit identify TESTS --search)",
+    "within": "forecast between the tests only (creepkit predict): beyond them its misfit grows",
     "noise": "state the noise of the readings in a column {column}",
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     "determine otherwise": "make a test that determines {names} (creepkit design)",
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
 }
 """{kind: what to do now}."""
+
+
+BRACKETS = (
+    "In brackets: 95 % intervals; those of forecasts and lives hold one new test. "
+    "The mean misfit is over the tests that were fitted."
+)
+"""Below the numbers of an answer."""
 
 
 TRY = {

@@ -83,7 +83,11 @@ def test_no_script_may_run(page: str) -> None:
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("A = 4.2e-05 +- 1e-06, to -3", "A = 4.2 × 10⁻⁵ ± 10⁻⁶, to −3"),
+        ("A = 4.2e-05 +- 1e-06, to -3", "A = 4.2\xa0×\xa010⁻⁵ ± 10⁻⁶, to −3"),
+        (
+            "from 3e-05 1/s at 40 MPa, 980 °C for 5 hours",
+            "from 3\xa0×\xa010⁻⁵\xa01/s at 40\xa0MPa, 980\xa0°C for 5 hours",
+        ),
         ("-0.31 [-0.4, inf]", "−0.31 [−0.4, ∞]"),
         ("Vh5205_C-89 at 1.5e3x, 2e-3-b", "Vh5205_C-89 at 1.5e3x, 2e-3-b"),
     ],
