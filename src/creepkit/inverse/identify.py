@@ -211,7 +211,7 @@ def _estimated(
         outcome = SearchOutcome([problem.bounds.of(range(len(law.params))).clip(start.u)], 0)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
-    how, widenings = EstimationOptions(start.u is not None, through, judged, progress), MOST_WIDENINGS
+    how, widenings = EstimationOptions(start.u is not None and start.is_near, through, judged, progress), MOST_WIDENINGS
 
     def within(law: CreepLaw, stage: Callable[..., Any], found: EstimationResult) -> StageEnd:
         settings, reference = found.problem.settings, problem.coordinates.reference

@@ -268,6 +268,10 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
     return CAUTIONS["held"].format(law=law, name=name, value=number(bound), end=end, wider=wider)
 
 
+RUNAWAY = 1.0
+"""Strain above what was measured, from which on a law has broken before the test."""
+
+
 def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
@@ -289,7 +293,8 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
-        yield CAUTIONS["worst"].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
+        kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
+        yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
     yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])

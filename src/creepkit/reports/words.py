@@ -36,6 +36,7 @@ CAUTIONS = {
     "unpredicted": "it does not predict every reading of {tests}",
     "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
     "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
+    "runs away": "it is worst in {test}: by the law it has broken by {time}",
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
     "implausible": "it takes {nuisance}, far from what was stated",
     "noise unknown": "the noise of readings is not known: the law cannot be judged",

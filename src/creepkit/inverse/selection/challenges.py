@@ -127,7 +127,7 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    refutes = kind == "threshold" or found.fits_better
+    refutes = found.excess <= found.refuting_excess
     return Challenge(kind, found.problem.law.name, f"{found.description} {found.comparison}", refutes)
 
 
@@ -215,7 +215,16 @@ class AlteredLaw:
     @property
     def fits_better(self) -> bool:
         """Whether chi-square is lower by more than it falls by chance (95 %) with the parameters that are not held."""
-        return bool(self.excess < -chi2.ppf(0.95, max(self.further - 1, 1)))
+        return self.excess < -self._by_chance
+
+    @property
+    def refuting_excess(self) -> float:
+        """The excess up to which a verdict for the best law does not stand."""
+        return NOT_EXCLUDED if self.kind == "threshold" else -self._by_chance
+
+    @property
+    def _by_chance(self) -> float:
+        return float(chi2.ppf(0.95, max(self.further - 1, 1)))
 
     @property
     def comparison(self) -> str:

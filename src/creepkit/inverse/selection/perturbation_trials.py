@@ -86,15 +86,26 @@ class Trial:
         """Whether it is the error of a length of the test pieces."""
         return is_length_nuisance(self.effects[0].kind) and not self.effects[0].kind.startswith(OFFSET)
 
-    def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
-        """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
-        return sizes_of_effect(
-            fits[law].linear_problem, self.effects[law], self.noise_model, common=self.scope == "all"
-        )
-
     def description(self, fits: Sequence[Identification], law: int) -> str:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
-        return _description(self, fits[law], law, self.sizes(fits, law))
+        fit, common = fits[law], self.scope == "all"
+        sizes = sizes_of_effect(fit.linear_problem, self.effects[law], self.noise_model, common=common)
+        effect, tests, differ = self.effects[law], len(fit.tests), sizes.size > 1
+        size = float(np.abs(sizes).max()) if differ else float(sizes[0])
+        where = "the test" if tests == 1 else f"each of the {tests} tests"
+        if self.is_of_length:
+            predictor = fit.least_squares_problem.predictor
+            nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
+            share = f"{abs(100 * size * effect.size / nominal):.2g} %"
+            if differ:
+                return f"independent errors of up to {share} in the {effect.kind} of {where}"
+            return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
+        amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
+        amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
+        if effect.kind == DRIFT:
+            return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
+        output = effect.kind.removeprefix(OFFSET).replace("_", " ")
+        return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
 
 
 def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, CommonCovarianceFits]:
@@ -108,26 +119,6 @@ def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) 
     common = under_common_covariance(fits, errors)
     penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
     return common.chi_square + common.log_determinant + penalties, common
-
-
-def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
-    """What it takes, to follow "with"; sizes : (1,) of all tests, or (tests,), in standard deviations."""
-    effect, tests, differ = trial.effects[law], len(fit.tests), sizes.size > 1
-    size = float(np.abs(sizes).max()) if differ else float(sizes[0])
-    where = "the test" if tests == 1 else f"each of the {tests} tests"
-    if trial.is_of_length:
-        predictor = fit.least_squares_problem.predictor
-        nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
-        share = f"{abs(100 * size * effect.size / nominal):.2g} %"
-        if differ:
-            return f"independent errors of up to {share} in the {effect.kind} of {where}"
-        return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
-    amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
-    amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
-    if effect.kind == DRIFT:
-        return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
-    output = effect.kind.removeprefix(OFFSET).replace("_", " ")
-    return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
 
 
 def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
