@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 
 CHI_SQUARE_NOTE = (
-    "chi-square: of all values under one estimated covariance, by which laws are compared; the reduced chi-square of a "
-    "verdict is that over the noise of the readings alone"
+    "chi-square is that of all values under one estimated covariance, by which laws are compared. The reduced "
+    "chi-square of a verdict is that over the noise of the readings alone"
 )
 
 
