@@ -480,9 +480,4 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     drawn_by = "identification_plot.identification_figure", "identification_plot.draw_identification"
 
     shown_by = "answer.answer_text"
-
-    def details(self) -> str:
-        """Everything that there is to say, as text."""
-        from creepkit.reports.identification import identification_text
-
-        return identification_text(self)
+    detailed_by = "identification.identification_text"

@@ -209,8 +209,16 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     return [_of_mean(*one) for one in stated]
 
 
+def known_bounds(one: Any) -> tuple[float, float]:
+    """Of the mean, of a strength or a life: infinite where one of them is not known, NaN where none is."""
+    low, high = one.bounds_of_mean
+    if low is None and high is None:
+        return math.nan, math.nan
+    return (-math.inf if low is None else low), (math.inf if high is None else high)
+
+
 def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
-    low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
+    low, high = known_bounds(one)
     remark = f"mean of rupture methods{', extrapolated' * bool(one.extrapolation)}"
     return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
 
@@ -257,29 +265,25 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
         low = low / further if low > 0 else low - (high - low)
     wider = f"bounds = {{ {name} = [{number(low)}, {number(high)}] }}"
     end = "upper" if at_upper else "lower"
-    return _said("held", law=law, name=name, value=number(bound), end=end, wider=wider)
+    return CAUTIONS["held"].format(law=law, name=name, value=number(bound), end=end, wider=wider)
 
 
 RUNAWAY = 1.0
 """Strain above what was measured, from which on a law has broken before the test."""
 
 
-def _said(kind: str, **values: object) -> str:
-    return CAUTIONS[kind].format(**values)
-
-
 def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield _said("not converged")
+        yield CAUTIONS["not converged"]
     if adequacy is None:
-        yield _said("unknown")
+        yield CAUTIONS["unknown"]
         return
     if adequacy.unpredicted:
-        yield _said("unpredicted", tests=named(adequacy.unpredicted, "test"))
+        yield CAUTIONS["unpredicted"].format(tests=named(adequacy.unpredicted, "test"))
     if adequacy.contradicting is not None:
-        yield _said("contradicting")
+        yield CAUTIONS["contradicting"]
     if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
@@ -290,12 +294,12 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
         kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
-        yield _said(kind, test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
+        yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
-        yield _said("remedy", remedy=adequacy.remedies[0])
-    yield from (_said("implausible", nuisance=one.description) for one in adequacy.implausible[:1])
+        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
+    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield _said("noise unknown")
+        yield CAUTIONS["noise unknown"]
 
 
 def _test(fit: Identification, name: str) -> str:
@@ -310,7 +314,7 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
-        yield _said("undecided", laws=named(others, "law"))
+        yield CAUTIONS["undecided"].format(laws=named(others, "law"))
     same = f"{ranking.best.law.name} above "  # a threshold
     yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
@@ -324,21 +328,21 @@ def _precision(fit: Identification) -> Iterator[str]:
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield _said(kind, by=by, names=named(names, "parameter"))
+            yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
+        yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
         kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield _said("not included", kinds=kinds, change=change)
+        yield CAUTIONS["not included"].format(kinds=kinds, change=change)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:
     if quality is not None and quality.flags:
         tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
-        yield _said("suspect", tests=named(tests, "test"))
+        yield CAUTIONS["suspect"].format(tests=named(tests, "test"))
 
 
 # ---- the answer ------------------------------------------------------------------------------------------------------

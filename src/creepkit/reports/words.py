@@ -75,6 +75,20 @@ BRACKETS = (
 """Below the numbers of an answer."""
 
 
+RUPTURE = {
+    "several": "use the mean of {names}: the tests cannot tell them apart",
+    "decisive": "use {best}, which passes all checks",
+    "single": "use {best}, which has nearly all the weight",
+    "only": "use {best}, the only method that was fitted",
+    "fails": "{best} fails: {check}",
+    "extrapolated": "strengths at {hours} h are extrapolated: the longest test has {longest} h",
+    "longer": "test to {hours} h: strengths beyond three times the longest test are extrapolated",
+    "check": "look at the tests of the check that fails",
+    "strengths": "use these strengths with their bounds",
+}
+"""{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
+
+
 TRY = {
     "exponent rises": "the stress exponent rises with stress",
     "exponent falls": "the stress exponent falls with stress",

@@ -200,16 +200,12 @@ class Ranking(Presentable, Plotted, Tabulated):
 
     drawn_by = "ranking.ranking_figure", "ranking.draw_misfits"
 
+    detailed_by = "ranking.ranking_text"
+
     def __str__(self) -> str:
         from creepkit.reports.answer import answer_text
 
         return answer_text(self.best, self)
-
-    def details(self) -> str:
-        """Everything that there is to say, as text."""
-        from creepkit.reports.ranking import ranking_text
-
-        return ranking_text(self)
 
 
 def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
