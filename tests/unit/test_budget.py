@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1168,
     "instruments": 1183,
     "integration": 785,
-    "inverse": 10027,
+    "inverse": 10026,
     "jobs": 250,
     "kernels": 1690,
     "language": 1552,
