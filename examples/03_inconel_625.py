@@ -101,17 +101,16 @@ tests = ck.exclude_suspect_frames(tests)
 # %%
 # One law for all tests
 # ---------------------
-# Three readings of "the fit": readings of equal weight, nothing unknown but the law; the same with whole tests weighed
-# by how far they lie from the others; and with the zero of each camera and each dimple's thickness unknown.
+# Two readings of "the fit": readings of equal weight, nothing unknown but the law; and with the zero of each camera and
+# each dimple's thickness unknown.
 
 ways = {
     "law alone": dict(nuisances=(), weights="noise"),
-    "robust": dict(nuisances=(), test_loss="student"),
-    "offset, thickness": dict(nuisances=(ck.Nuisance("offset", sd=0.012), THICKNESS), test_loss="student"),
+    "offset, thickness": dict(nuisances=(ck.Nuisance("offset", sd=0.012), THICKNESS)),
 }
 starts = 4
-if folder is None:  # three virtual tests need no robust reading, and every step once
-    starts, ways = 1, {name: way for name, way in ways.items() if name != "robust"}
+if folder is None:  # of three virtual tests every step once
+    starts = 1
 fits = {name: ck.identify(law, tests, using=dimple, starts=starts, **way) for name, way in ways.items()}
 best = fits["offset, thickness"]
 print(best)

@@ -13,7 +13,6 @@ class IdentificationSettingsKeywords(TypedDict, total=False):
     seed: int | None
     nuisances: Nuisance | str | Sequence[Nuisance | str] | None
     weights: Weights | None
-    test_loss: Literal["gaussian", "student"] | None
     suspect_frames: Literal["exclude", "keep"] | None
     further_laws: int | None
     rupture_times: Literal["auto", "use", "ignore"] | None

@@ -12,7 +12,8 @@ of the predicted one, root mean square. Bars: three creep curves; "scatter": fiv
 The law: one of the four single laws of Table 1 is planted. "Standard" is 8, then 10 MPa for 12 h, with one dimple or
 three. Designed campaigns begin with 2 h ("first") and go on with what ck.design() proposes for half of the standard
 hours, unless the verdict is decisive already. "Singled out" has more than 0.95 of the weight and explains the tests;
-"decisive" stands every challenge too. Norton's law is a special case of the others, so that no test singles it out.
+"decisive" stands every challenge too. Norton's law is a special case of the others: it is singled out where their
+values make them that law over the tests.
 """
 
 import json

@@ -8,12 +8,12 @@ for tests 01 to 08 and one for tests 09, 11 and 12. Nuisance parameters are the 
 thickness of each dimple (0.4935 mm, standard deviation 0.027 mm). Laws are multiplied by Arrhenius' factor about
 1050 K; n(t) is the drifting exponent without strain hardening.
 
-Misfit: by finite elements, `ck.identify(law, tests, using="bulge", test_loss="student", weights="noise")`. The pooled
-loss is that of the amplitude: squared differences over squared deviations from the mean of all frames. Chi-square is
-that of `fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that
-neighbouring frames show. Held out: each test predicted through the reduced-order model from the others, by likelihood,
-at nominal thickness, with the step that its group shows; test 12, which moves half as much as its like, has 0.2 of it
-without the event. Values marked * are not determined, or at their bound; units 1/s, s, J/mol, MPa.
+Misfit: by finite elements, `ck.identify(law, tests, using="bulge", weights="noise")`. The pooled loss is that of the
+amplitude: squared differences over squared deviations from the mean of all frames. Chi-square is that of
+`fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that neighbouring
+frames show. Held out: each test predicted through the reduced-order model from the others, by likelihood, at nominal
+thickness, with the step that its group shows; test 12, which moves half as much as its like, has 0.2 of it without the
+event. Values marked * are not determined, or at their bound; units 1/s, s, J/mol, MPa.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Runs:
         """What all identifications have in common; with the event one step of temperature for each group of tests."""
         weak = tuple(h.name for h in self.tests if h.name not in STRONG)
         steps = [ck.Nuisance("temperature step", "all", sd=30.0, start=EVENT, tests=group) for group in (weak, STRONG)]
-        return {"starts": self.starts, "test_loss": "student", "nuisances": (*RIG, *(steps if event else ()))}
+        return {"starts": self.starts, "nuisances": (*RIG, *(steps if event else ()))}
 
     def fit(self, law: str, event: bool) -> Row:
         """One law by finite elements, by least squares."""

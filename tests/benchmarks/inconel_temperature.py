@@ -32,7 +32,7 @@ LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)
 NUISANCES = (ck.Nuisance("offset", sd=0.012), THICKNESS)
 ONE_TEMPERATURE = IdentificationSettings(starts=2, nuisances=NUISANCES)
-ALL_TESTS = replace(ONE_TEMPERATURE, test_loss="student", weights="likelihood")
+ALL_TESTS = replace(ONE_TEMPERATURE, weights="likelihood")
 FORMS = dict.fromkeys(LAW.names, ("constant", "linear", "activated")) | {"A": ("arrhenius", "logarithmic")}
 
 

@@ -156,7 +156,8 @@ def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
         assert result.exit_code == 0, f"{line}\n{result.output}"
         if words[0] == "run":
             truth = json.loads(Path("curves/truth.json").read_text())
-            assert f"decisive; weights: {truth['law']}" in result.stdout
+            assert f"use {truth['law']}" in result.stdout
+            assert "\n  decisive; weight " in result.stdout
             assert "not decisive" not in result.stdout
 
 

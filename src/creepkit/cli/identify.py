@@ -12,8 +12,7 @@ from creepkit.cli.command_options import OutputPath
 from creepkit.cli.identified_folder import check_identified_folder, write_ranking
 from creepkit.cli.shared import Files, Json, Only, Reader, Workers, selected
 from creepkit.errors import FitError
-from creepkit.inverse.candidate_laws import LawChanges
-from creepkit.inverse.search_options import SearchOptions
+from creepkit.inverse.candidate_laws import LawChanges, SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.law_search.search import LawSearchOptions
 from creepkit.limits import STRAIN

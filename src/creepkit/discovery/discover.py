@@ -25,6 +25,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import sound_tests, suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
@@ -297,7 +298,9 @@ def temperature_study(
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     if joint_fit is None or options.moduli:
         joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
-    isothermal_fits, failures = _isothermal_fits(law, histories, predictor, options.within, settings, progress)
+    isothermal_fits, failures = _isothermal_fits(
+        law, histories, predictor, joint_fit, options.within, settings, progress
+    )
     notes += suspect_frames_note(histories)
     temperature_law = None
     try:
@@ -349,17 +352,29 @@ def _isothermal_fits(
     law: CreepLaw,
     tests: Sequence[History],
     predictor: Predictor,
+    joint_fit: Identification,
     temperature_tolerance: float,
     settings: IdentificationSettings,
     progress: IterationCallback | None,
 ) -> tuple[list[Identification], list[str]]:
+    """One for each temperature, which begins at the values of all tests there; why the others could not be made."""
     fits, failures = [], []
     groups = group_by_temperature(tests, temperature_tolerance)
     for k, group in enumerate(groups):
         try:
-            fits.append(identify(law, group, predictor, settings=settings))
+            start = _start_at(law, joint_fit, group[0].mean_temperature)
+            fits.append(identify(law, group, predictor, settings=settings, start=start))
         except CreepkitError as error:
             failures.append(f"at {celsius_text(group[0].mean_temperature, digits=0)} alone: {error}")
         if progress is not None:
             progress("temperature", k + 1, len(groups))
     return fits, failures
+
+
+def _start_at(law: CreepLaw, joint_fit: Identification, T: float) -> StartingEstimate | None:
+    """The rates and exponents of the law times Arrhenius' factor at a temperature, K; None where it is another law."""
+    reference = replace(joint_fit.reference, temperature=T)
+    there = Coordinates(joint_fit.law, reference).u(joint_fit.coordinates.theta(joint_fit.u))
+    values = dict(zip(joint_fit.law.names, there, strict=True))
+    u = np.array([values.get(name, np.nan) for name in law.names])
+    return StartingEstimate(u, reference=reference, is_near=False) if np.isfinite(u).all() else None

@@ -24,9 +24,9 @@ from creepkit.experiments.expectations import Expectation, LawCriterion, Precisi
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
 from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
+from creepkit.inverse.errors_of_tests import with_expected_scatter
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
-from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
@@ -119,7 +119,10 @@ class _Search:
         self.task, self.rigs = task, {rig.specimen: rig for rig in rigs}
         self.progress: Progress = progress or (lambda *_: None)
         with single_threaded_blas():
-            noise_model, of_ranking = _noise_model(task), task.goal == "law"
+            fit, of_ranking = task.laws[0], task.goal == "law"
+            noise_model = fit.noise_model  # of values with the scatter of rates as their intervals have it
+            if not of_ranking:
+                noise_model = with_expected_scatter(fit.least_squares_problem, fit.linear_problem, noise_model)
             known = [KnownLaw.from_identification(fit, noise_model, of_ranking=of_ranking) for fit in task.laws]
             known += [KnownLaw.from_altered(task.laws[k], altered, noise_model) for k, altered in task.altered]
         self.outcomes = PlannedOutcomes(known, progress, len(task.laws))
@@ -273,15 +276,6 @@ def _histories(plan: Sequence[PlannedTest]) -> list[History]:
     return [history for test in plan for history in test.histories]
 
 
-def _noise_model(task: DesignTask) -> NoiseModel:
-    """That of the best law: of values with the scatter of rates as their intervals have it, its expected square."""
-    fit = task.laws[0]
-    noise_model, scatter = fit.noise_model, fit.rate_scatter
-    if task.goal == "law" or len(fit.histories) == 1 or scatter is None or scatter.known is not None:
-        return noise_model
-    return replace(noise_model, rate=max(noise_model.rate, scatter.posterior.mean_square("test") ** 0.5))
-
-
 def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> LawCriterion:
     ranking = task.ranking
     assert ranking is not None
@@ -290,7 +284,7 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
     if not np.isfinite(chi_squares).all():
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
-    altered = [(k, one.excess) for k, one in task.altered]
+    altered = [(k, one.excess, one.refuting_excess) for k, one in task.altered]
     return LawCriterion(outcomes, task.weights, excess, chi_squares, ranking.independent_frames, altered, seed)
 
 

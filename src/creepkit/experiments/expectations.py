@@ -20,10 +20,11 @@ the best candidates the step begins at the draw of the posterior of b which expl
 the bounds of b. A chi-square that is expected by one step is off by up to a factor of two.
 
 The information is the mutual information of law and outcome (Box & Hill (1967), Technometrics 9, 57), in nats: the mean
-decrease of the entropy of the weights. Planned tests have to exclude more than the other laws: shares of them, and
-a threshold stress (selection.challenges). Those that the tests allow are compared in the same way with the law that
-they alter. The mean of chi-square over laws, with weights, is the T-criterion (Atkinson & Fedorov (1975), Biometrika
-62, 57); it grows without limit where a verdict is certain already.
+decrease of the entropy of the weights. Planned tests have to tell more apart than the other laws: shares of them, and a
+threshold stress (selection.challenges). Those that the tests allow are compared in the same way with the law that they
+alter; a verdict stands where none of them refutes it by the rule of a ranking. The mean of chi-square over laws, with
+weights, is the T-criterion (Atkinson & Fedorov (1975), Biometrika 62, 57); it grows without limit where a verdict is
+certain already.
 """
 
 from __future__ import annotations
@@ -38,7 +39,6 @@ from creepkit.experiments.planned_outcomes import Expansion, PlannedOutcomes
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.reference_conditions import reference_condition
-from creepkit.inverse.selection.challenges import NOT_EXCLUDED
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient, log_rate
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.language import CreepLaw
@@ -65,7 +65,7 @@ class Expectation:
     information : nats. sd, current_sd : of the quantity asked for, on its scale (of ln where that is log), NaN without.
     parameter_sd, current_parameter_sd : {name: standard deviation} of the best law's parameters after the test and now,
     of ln where the scale is log, when the name is "ln A". probability : that the right law has more than 0.95 of the
-    weight, with all that the tests allow beside it excluded; wrong : that a wrong one has more than 0.95.
+    weight and nothing that the tests allow beside it refutes it; wrong : that a wrong one has more than 0.95.
     """
 
     information: float
@@ -153,7 +153,6 @@ def _after(fit: Identification, conditions: Floats) -> Identification:
         members={level: (*names, *names[-1:] * count) for level, names in scatter.members.items()},
         log_factor=np.append(scatter.log_factor, np.zeros(count)),
         variance=np.append(scatter.variance, np.full(count, scatter.variance.min())),
-        weight=np.append(scatter.weight, np.ones(count)),
         design=np.concatenate([scatter.design, rows]),
         stresses=np.append(scatter.stresses, conditions[0]),
         temperatures=np.append(scatter.temperatures, conditions[1]),
@@ -186,7 +185,7 @@ class LawCriterion:
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
     made. frames : how many of them are independent. altered : of the further laws, the position of the law that each
-    alters, and its chi-square above that one's.
+    alters, its chi-square above that one's, and that up to which it refutes it.
     """
 
     outcomes: PlannedOutcomes
@@ -194,7 +193,7 @@ class LawCriterion:
     excess: Floats
     chi_squares: Floats
     frames: float
-    altered: Sequence[tuple[int, float]] = ()
+    altered: Sequence[tuple[int, float, float]] = ()
     seed: int = 0
     _deviations: dict[int, Floats] = field(default_factory=dict)
     _expansions: dict[int, Expansion] = field(default_factory=dict)
@@ -215,15 +214,16 @@ class LawCriterion:
         for a, name in enumerate(self.names):
             Q = self._increments(a, histories, at_draws)
             score = (self.excess + penalty + Q[:count].T).T
-            own = [(count + k, excess) for k, (law, excess) in enumerate(self.altered) if law == a]
-            more = np.array([beyond + Q[k] - Q[a] for k, beyond in own]).reshape(-1, Q.shape[1])
-            before = _shares(np.append(self.excess, [self.excess[a] + beyond for _, beyond in own])[:, None])
+            own = [(count + k, excess, limit) for k, (law, excess, limit) in enumerate(self.altered) if law == a]
+            more = np.array([beyond + Q[k] - Q[a] for k, beyond, _ in own]).reshape(-1, Q.shape[1])
+            refuting = np.array([limit for *_, limit in own]).reshape(-1, 1)
+            before = _shares(np.append(self.excess, [self.excess[a] + beyond for _, beyond, _ in own])[:, None])
             after = _shares(np.concatenate([score, score[a] + more]))
             information += weight[a] * float(np.mean(np.log(np.maximum(after[a], 1e-300)) - np.log(before[a])))
             decided = _shares(score) > DECISIVE_WEIGHT
-            right += weight[a] * float((decided[a] & (more > NOT_EXCLUDED).all(axis=0)).mean())
+            right += weight[a] * float((decided[a] & (more > refuting).all(axis=0)).mean())
             wrong += weight[a] * float(np.delete(decided, a, axis=0).any(axis=0).mean())
-            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(excess for _, excess in self.altered)]
+            current = [*(self.chi_squares - self.chi_squares[a]).tolist(), *(excess for _, excess, _ in self.altered)]
             for b in (b for b in self._compared(a) if b != a):
                 expected, other = current[b] + float(np.median(Q[b] - Q[a])), self.outcomes.laws[b].fit.law.name
                 chi_squares.append(ExpectedChiSquare(name, other, current[b], expected))

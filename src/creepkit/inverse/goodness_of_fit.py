@@ -117,7 +117,6 @@ class TestFit:
     log_strain_rms, log_strain_bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted
         strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.residuals).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
-    weight : of the test in the fit; below one where test_loss="student" found it far from the others.
     rupture : its end, where that is known and predicted. minimum_rate : of a test without frames, where it is stated.
     """
 
@@ -129,7 +128,6 @@ class TestFit:
     log_strain_rms: float
     log_strain_bias: float
     rate_factor: float = 1.0
-    weight: float = 1.0
     outputs: tuple[OutputFit, ...] = ()
     rupture: SingleValue | None = None
     minimum_rate: SingleValue | None = None
@@ -184,7 +182,6 @@ def test_fits(
             for name in compared_outputs(problem.predictor, history)
             if name in offset_by_output and usable_frames(history, name).any()
         )
-        rate_factor, weight = float(np.exp(log_factors[k])), float(residuals.test_weights[k])
         test_fits.append(
             TestFit(
                 history.name,
@@ -192,8 +189,7 @@ def test_fits(
                 test_ratios.size + linear,
                 rms,
                 bias,
-                rate_factor,
-                weight,
+                float(np.exp(log_factors[k])),
                 outputs,
                 *single_values[k],
             )

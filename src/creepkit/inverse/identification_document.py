@@ -64,7 +64,7 @@ CODEC = RecordCodec(
         OutputNoise: {"*": SIZE, "correlation_length": POSITIVE},
         RateScatter: {
             "*": ANY_SIZE,
-            **dict.fromkeys(("weight", "stresses", "temperatures", "output_scales", "output_floors"), POSITIVE_SIZE),
+            **dict.fromkeys(("stresses", "temperatures", "output_scales", "output_floors"), POSITIVE_SIZE),
             "variance": numbers(0.0, LARGEST**2),
             "known": SIZE,
         },
@@ -80,7 +80,7 @@ CODEC = RecordCodec(
         OutputErrors: {"*": NOT_NEGATIVE_OR_NAN},
         OutputFit: {"noise": NOT_NEGATIVE},
         SingleValue: {"*": NOT_NEGATIVE_OR_NAN, "measured": POSITIVE},
-        TestFit: {"*": NAN_ALLOWED, "frames": NOT_NEGATIVE, "weight": POSITIVE, "rate_factor": numbers()},
+        TestFit: {"*": NAN_ALLOWED, "frames": NOT_NEGATIVE, "rate_factor": numbers()},
         Nuisance: {"sd": numbers(0.0, above=True, infinite=True), "bounds": INFINITY_ALLOWED},
         NuisanceEstimate: {"sd": NOT_NEGATIVE, "prior_sd": INFINITY_ALLOWED},
         FitStatistics: {"parameters": NOT_NEGATIVE},
@@ -146,7 +146,7 @@ def _with_arrays(fit: Identification) -> Identification:
     if scatter is None:
         return fit
     unknowns = size + len(fit.nuisances)
-    vectors = dict.fromkeys(("log_factor", "variance", "weight", "stresses", "temperatures"), (tests,))
+    vectors = dict.fromkeys(("log_factor", "variance", "stresses", "temperatures"), (tests,))
     matrices = dict.fromkeys(("precision", "errors"), (unknowns, unknowns))
     shapes = {**vectors, **matrices, "design": (tests, unknowns), "gradient": (unknowns,)}
     return replace(fit, rate_scatter=with_shapes(scatter, shapes))

@@ -19,7 +19,6 @@ from creepkit import registry
 from creepkit.errors import FitWarning
 from creepkit.inverse.compared_tests import UNTESTABLE, compared_tests, followed_duration, rests_on_durations
 from creepkit.inverse.frame_noise import usable_frames
-from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import MINIMUM_TESTS
@@ -36,12 +35,12 @@ from creepkit.records.units import celsius_text
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
-LOW_TEST_WEIGHT = 0.5
-"""Weight below which a test is named."""
-
-
 LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
+
+
+PAUSE = 0.1
+"""Of the largest stress of a test under a load: below it, as in a pause or a loading ramp, hardly anything creeps."""
 
 
 def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -50,7 +49,13 @@ def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> 
     values : of the law, by which stresses are simulated where they change while specimens creep.
     """
     tests = problem.histories
-    stresses = [v for h in tests for v in simulated_stresses(problem.law, values, h, problem.predictor)]
+    simulated = [(h, simulated_stresses(problem.law, values, h, problem.predictor)) for h in tests]
+    stresses = [
+        float(v)
+        for h, of_test in simulated
+        for v in of_test
+        if h.loading.quantity == "strain" or v >= PAUSE * of_test.max()
+    ]
     values_by_name = {
         "stress": stresses or [0.0],
         "temperature": [v for h in tests for v in h.followed_temperatures],
@@ -94,14 +99,12 @@ def data_digest(problem: LeastSquaresProblem) -> str:
     for array in (observations.values, observations.times, observations.present, observations.output_index):
         digest.update(np.ascontiguousarray(array).tobytes())
     names = [h.name for h in problem.histories]
-    method = (names, observations.outputs, observations.transforms, settings.test_loss, settings.nuisances)
+    method = (names, observations.outputs, observations.transforms, settings.nuisances)
     digest.update(repr(method).encode())
     return digest.hexdigest()[:16]
 
 
-def identification_notes(
-    estimation: EstimationResult, tests: Sequence[TestFit], nuisances: Sequence[NuisanceEstimate]
-) -> tuple[str, ...]:
+def identification_notes(estimation: EstimationResult, nuisances: Sequence[NuisanceEstimate]) -> tuple[str, ...]:
     """What limits the trust in an identification, one sentence each."""
     problem = estimation.problem
     sentences, law, histories, settings = [], problem.law, problem.histories, problem.settings
@@ -132,7 +135,11 @@ def identification_notes(
     sentences += unstated_member_notes(histories)
     if (problem.bound_penalties.constraint_violations(estimation.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
-    return (*sentences, *_test_notes(problem, tests, nuisances))
+    limits = problem.nuisance_parameters
+    for n, low, high in zip(nuisances, limits.low, limits.high, strict=True):
+        if min(n.value - low, high - n.value) < 1e-4 * (high - low):
+            sentences.append(f"the {n.key} of '{n.owner}' lies at its bound, {n.value:.4g}")
+    return tuple(sentences)
 
 
 def one_end_note(minima: Mapping[str, int]) -> tuple[str, ...]:
@@ -172,21 +179,6 @@ def _large_strain_notes(histories: Sequence[History]) -> list[str]:
         if any(h.outputs["strain"][usable_frames(h, "strain")].max(initial=0.0) > limit for h in tests):
             return [f"strains above {limit:g} were fitted: a column in percent must say so, as strain_pct"]
     return []
-
-
-def _test_notes(
-    problem: LeastSquaresProblem, tests: Sequence[TestFit], nuisances: Sequence[NuisanceEstimate]
-) -> list[str]:
-    sentences = [
-        f"test '{m.name}' is far from the others and weighs {m.weight:.2g} of one"
-        for m in tests
-        if m.weight < LOW_TEST_WEIGHT
-    ]
-    nuisance_parameters = problem.nuisance_parameters
-    for n, low, high in zip(nuisances, nuisance_parameters.low, nuisance_parameters.high, strict=True):
-        if min(n.value - low, high - n.value) < 1e-4 * (high - low):
-            sentences.append(f"the {n.key} of '{n.owner}' lies at its bound, {n.value:.4g}")
-    return sentences
 
 
 def with_attached(fit: Identification, tests: Sequence[History], predictor: Predictor) -> Identification:

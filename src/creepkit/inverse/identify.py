@@ -211,7 +211,7 @@ def _estimated(
         outcome = SearchOutcome([problem.bounds.of(range(len(law.params))).clip(start.u)], 0)
     known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in outcome.starts]
-    how, widenings = EstimationOptions(start.u is not None, through, judged, progress), MOST_WIDENINGS
+    how, widenings = EstimationOptions(start.u is not None and start.is_near, through, judged, progress), MOST_WIDENINGS
 
     def within(law: CreepLaw, stage: Callable[..., Any], found: EstimationResult) -> StageEnd:
         settings, reference = found.problem.settings, problem.coordinates.reference
@@ -415,7 +415,7 @@ def _reported(
     used = compares_rupture_times(law, problem.settings)
     single_values = values_of_tests.compared(histories, without_curves=used)
     random_effects = predicted_random_effects(residuals, expected)
-    by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x).with_test_weights(residuals.test_weights)
+    by_law = replace(problem.about_rates(x, None), stopped=None).residuals(x)
     tests = test_fits(problem, by_law, random_effects, histories, prediction, single_values)
     nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance + of_errors))[count:]
@@ -455,7 +455,7 @@ def _reported(
         rate_scatter=scatter,
         notes=(
             *suspect_frames_note(histories),
-            *identification_notes(best, tests, nuisance_estimates),
+            *identification_notes(best, nuisance_estimates),
             *one_end_note(search_outcome.minima),
             *(nuisance.sentence for nuisance in implausible),
             *cut_interval_notes(law, estimates),

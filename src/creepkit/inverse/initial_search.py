@@ -22,17 +22,19 @@ from creepkit.records import Predictor
 
 @dataclass(frozen=True, eq=False)
 class StartingEstimate:
-    """Where an identification begins instead of with a global search; it takes two rounds at most.
+    """Where an identification begins instead of with a global search; two rounds at most lead from one that is near.
 
     u : (parameters,) conditioned coordinates about `reference`, None for a global search in these coordinates.
     nuisances : explicit nuisances as they were estimated before. values_only : whether values and intervals are all
     that is asked for: no samples of the posterior where a value is at its bound, no refit without a test that is off.
+    is_near : whether it is an end of the same law by tests that hardly differ.
     """
 
     u: Floats | None
     nuisances: Sequence[NuisanceEstimate] = ()
     reference: ReferencePoint | None = None
     values_only: bool = False
+    is_near: bool = True
 
     @classmethod
     def from_identification(cls, fit: Identification, *, values_only: bool = False) -> StartingEstimate:

@@ -25,7 +25,7 @@ from creepkit.inverse.perturbations import with_derivatives_to_lengths
 from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_single_value_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
@@ -107,23 +107,20 @@ def estimate_iteratively(
 
     noise : from which to begin, if it is known already.
     """
-    robust, by_likelihood = estimator.settings.test_loss == "student", estimator.by_likelihood
+    by_likelihood = estimator.by_likelihood
     residuals, best, is_near = problem.residuals(x), None, noise is not None
     noise = noise or estimator.starting_noise(len(problem.histories))
     gain, own = LIKELIHOOD_TOLERANCE * by_likelihood, limits.least_squares
     tolerances = replace(own, tolerance=max(own.tolerance, gain), gain=max(own.gain, gain))
     for round_index in range(limits.rounds):
-        previous_weights = residuals.test_weights
-        if robust:
-            residuals = residuals.with_test_weights(robust_test_weights(residuals, noise))
         if by_likelihood and best is not None:
             problem, residuals = about_own_rates(problem, x, residuals, noise)
         problem = problem.about_stopped_tests(x, noise)
-        residuals = problem.residuals(x).with_test_weights(residuals.test_weights)
+        residuals = problem.residuals(x)
         linear = problem.linearised(x, residuals)
         noise = estimator.estimate(residuals, noise, linear)
         factor = _covariance_factor(problem, residuals, noise, estimator)
-        problem, weights = problem.with_covariance(factor), residuals.test_weights
+        problem = problem.with_covariance(factor)
         if by_likelihood and (is_near or best is not None):
             # the covariance moves with the values: near the end each step is taken under its own
             problem, linear, step = _stepped(problem, linear, factor, noise, SMALL_STEP)
@@ -131,7 +128,7 @@ def estimate_iteratively(
         else:
             minimum = problem.minimise(x, tolerances=tolerances)
             x, converged = minimum.x, minimum.converged
-        residuals = problem.residuals(x).with_test_weights(weights)
+        residuals = problem.residuals(x)
         problem = _with_priors_found(problem, residuals, noise, x)
         linear = problem.linearised(x, residuals)
         current = EstimationResult(problem, linear, noise, _log_likelihood(problem, linear, noise), converged)
@@ -142,8 +139,8 @@ def estimate_iteratively(
         moved = best is not None and (
             best.problem.log_factors is not problem.log_factors or best.problem.stopped is not problem.stopped
         )
-        best = current if best is None or gain > 0 or robust or moved else best
-        if abs(gain) < CONVERGED_GAIN and np.abs(weights - previous_weights).max() < CONVERGED_GAIN:
+        best = current if best is None or gain > 0 or moved else best
+        if abs(gain) < CONVERGED_GAIN:
             best = replace(best, converged=True)
             break
     assert best is not None
@@ -162,7 +159,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         expected = with_expected_scatter(problem, linear, noise)
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
         problem = problem.about_stopped_tests(linear.x, expected)
-        residuals = problem.residuals(linear.x).with_test_weights(residuals.test_weights)
+        residuals = problem.residuals(linear.x)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
         errors = errors_of_tests(problem, linear.x, linear, noise)
         factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
@@ -193,7 +190,7 @@ def _stepped(
     for _ in range(MOST_HALVINGS if size > least else 0):
         expected = replace(residuals, values=residuals.values + residuals.jacobian @ (x - linear.x))
         moved = _about_predicted_rates(problem, x, expected, noise)
-        there = moved.residuals(x).with_test_weights(residuals.test_weights)
+        there = moved.residuals(x)
         further = replace(moved.linearised(x, there), free=free)
         if is_finite(there) and _chi_square(further, factor) < _chi_square(linear, factor):
             return moved, further, size
@@ -213,7 +210,7 @@ def within_bounds(found: EstimationResult) -> EstimationResult:
     problem, x = found.problem, found.problem.within_bounds(found.x)
     if np.array_equal(x, found.x):
         return found
-    residuals = problem.residuals(x).with_test_weights(found.linear.residuals.test_weights)
+    residuals = problem.residuals(x)
     return replace(found, linear=problem.linearised(x, residuals)) if is_finite(residuals) else found
 
 
@@ -234,11 +231,11 @@ def about_own_rates(
 ) -> tuple[LeastSquaresProblem, Residuals]:
     """The problem about the rate that each test has beside the law at x (unknowns,), and its residuals there.
 
-    residuals : of the problem at x, with the weights of tests. As it is where its rates are those that are predicted.
+    residuals : of the problem at x. As it is where its rates are those that are predicted.
     """
     for _ in range(MOST_RATE_STEPS):
         moved = _about_predicted_rates(problem, x, residuals, noise)
-        there = moved.residuals(x).with_test_weights(residuals.test_weights)
+        there = moved.residuals(x)
         if moved is problem or moved.log_factors is None or not is_finite(there):
             break
         problem, residuals = moved, there

@@ -101,7 +101,7 @@ class Judge:
         if not known.judged.any():
             return None
         judged = linear.residuals.where(known.judged & linear.residuals.present)
-        residuals = replace(judged, test_weights=np.ones(len(known.sd)), relative_noise=known.sd)
+        residuals = replace(judged, relative_noise=known.sd)
         independent, reduced = self._independent_noise, replace(linear, residuals=residuals)
         solution = _within_bounds(reduced, CovarianceFactor.of_residuals(residuals, independent))
         noise = NoiseModel({name: OutputNoise(one.noise) for name, one in independent.outputs.items()})

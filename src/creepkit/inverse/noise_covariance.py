@@ -45,9 +45,7 @@ class CovarianceFactor:
     @classmethod
     def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel) -> CovarianceFactor:
         """The covariance of residuals under a noise model."""
-        common = residuals.common_effects
-        weighted = None if common is None else common / np.sqrt(residuals.test_weights)[:, None, None]
-        return cls(residuals.series, noise_model.components, common=weighted)
+        return cls(residuals.series, noise_model.components, common=residuals.common_effects)
 
     def whiten(self, values: Floats) -> Floats:
         """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
@@ -110,7 +108,7 @@ class CovarianceFactor:
         out = np.array(values, float, order="C")
         if rows.size:
             flat = out.reshape(-1, rows.shape[1])
-            flat[series.places] = rows * series.root_weights if inverse else rows
+            flat[series.places] = rows
         return out, float(log_determinant[0])
 
 
@@ -151,8 +149,7 @@ class NoiseLikelihood:
 
 def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
     """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    weighted = CovarianceFactor.of_residuals(unweighted, noise_model).inverse_times(-residuals.values)
+    weighted = CovarianceFactor.of_residuals(residuals, noise_model).inverse_times(-residuals.values)
     weighted_sensitivity = residuals.offset_sensitivity * weighted
     offsets = [
         s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)

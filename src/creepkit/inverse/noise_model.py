@@ -53,7 +53,6 @@ class Residuals:
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
         the typical noise of that output.
-    test_weights : (tests,) -; the covariance of a test is divided by it.
     random_effect_sensitivities : (tests, observations, effects) -, effect of one standard deviation of further random
         effects, independent in each test, or None. common_effects : (tests, observations, effects) -, of effects that
         all tests have alike, or None.
@@ -72,17 +71,12 @@ class Residuals:
     log_rate_sensitivity: Floats
     output_index: Ints
     relative_noise: Floats
-    test_weights: Floats
     random_effect_sensitivities: Floats | None = None
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
     shared_noise: SharedNoise | None = None
     rate_errors: Floats | None = None
     stopped: StoppedTests = field(default_factory=StoppedTests)
-
-    def with_test_weights(self, test_weights: Floats) -> Residuals:
-        """The same with other weights of tests."""
-        return replace(self, test_weights=test_weights)
 
     def with_effects(self, own: Sequence[Floats], common: Sequence[Floats] = ()) -> Residuals:
         """The same with further random effects.
@@ -133,7 +127,7 @@ class Residuals:
         rates = None if self.rate_errors is None else (self.rate_errors[:, None] * self.log_rate_sensitivity)[..., None]
         stacked = np.concatenate([stacked, *(one for one in (further, ends, rates) if one is not None)], axis=-1)
         return ObservationSeries.of_observations(
-            self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights, self.shared_noise
+            self.present, self.output_index, self.correlation_coordinate, stacked, self.shared_noise
         )
 
 

@@ -54,8 +54,7 @@ class ObservationSeries:
     (tests + 1,) first datum of each test; output : (data,). loadings : (data, 5 + effects) lag to the previous datum of
     the output (-1: it is the first), then what a white error, an offset, a discrepancy, ln of the rate and each further
     random effect of one does; with factors, (data, 6 + effects + factors), whether the datum is the first of its frame,
-    and the factors of its white error. effects, factors : how many. test_weights : (tests,) -; root_weights : (data, 1)
-    their roots.
+    and the factors of its white error. weights : (tests,) of the core, all one. effects, factors : how many.
     """
 
     shape: tuple[int, int]
@@ -63,26 +62,19 @@ class ObservationSeries:
     starts: Ints
     output: Ints
     loadings: Floats
-    test_weights: Floats
-    root_weights: Floats
+    weights: Floats
     effects: int = 0
     factors: int = 0
 
     @classmethod
     def of_observations(
-        cls,
-        present: Bools,
-        output_index: Ints,
-        time: Floats,
-        effects: Floats,
-        test_weights: Floats,
-        shared_noise: SharedNoise | None = None,
+        cls, present: Bools, output_index: Ints, time: Floats, effects: Floats, shared_noise: SharedNoise | None = None
     ) -> ObservationSeries:
         """The series of observations.
 
         present, output_index, time : (tests, observations) which are data, of which output, and correlation time.
         effects : (tests, observations, 4 + effects) the columns of the loadings behind the lag.
-        test_weights : (tests,) -. shared_noise : of outputs whose noise is correlated.
+        shared_noise : of outputs whose noise is correlated.
         """
         tests, observations = present.shape
         places = np.flatnonzero(present)
@@ -102,17 +94,15 @@ class ObservationSeries:
             is_new[1:, 0] = (np.diff(test) != 0) | (np.diff(frame) != 0)
             own = shared_noise.loadings.reshape(present.size, factors)[places]
             loadings = np.concatenate([loadings[order], is_new, own], axis=1)
-        weights = np.ascontiguousarray(test_weights, float)
         starts = np.searchsorted(test, np.arange(tests + 1)).astype(np.int64)
-        root_weights = np.sqrt(weights)[test][:, None]
         return cls(
-            (tests, observations), places, starts, output.astype(np.int64), np.ascontiguousarray(loadings), weights,
-            root_weights, effects.shape[-1] - 4, factors,
+            (tests, observations), places, starts, output.astype(np.int64), np.ascontiguousarray(loadings),
+            np.ones(tests), effects.shape[-1] - 4, factors,
         )  # fmt: skip
 
     def rows(self, values: Floats) -> Floats:
-        """(data, columns) of values (tests, observations, columns), times the roots of the weights of their tests."""
-        return np.ascontiguousarray(values.reshape(self.shape[0] * self.shape[1], -1)[self.places] * self.root_weights)
+        """(data, columns) of values (tests, observations, columns)."""
+        return np.ascontiguousarray(values.reshape(self.shape[0] * self.shape[1], -1)[self.places])
 
     def arguments(self, components: Floats) -> tuple[Any, ...]:
         """The first arguments of functions of the core; the caller keeps the series and the components alive.
@@ -120,5 +110,5 @@ class ObservationSeries:
         components : (5 outputs + 3,) as NoiseModel.components has them.
         """
         counts = (self.shape[0], (components.size - 3) // 5, self.effects, self.factors)
-        arrays = (self.starts, self.output, self.loadings, self.test_weights, components)
+        arrays = (self.starts, self.output, self.loadings, self.weights, components)
         return (*(ctypes.c_int64(n) for n in counts), *(address(array) for array in arrays))

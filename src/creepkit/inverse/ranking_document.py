@@ -46,6 +46,7 @@ class LawFile:
     excess: float
     weight: float
     chi_square: float
+    same_as: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def write_ranking(ranking: Ranking, path: str | Path) -> Path:
 def ranking_to_document(ranking: Ranking, files: Sequence[tuple[str, str]]) -> dict[str, Any]:
     """The ranking as JSON-able data; files : of each law, that of its identification, beside it, and its SHA-256."""
     pairs = [*zip(files, ranking.laws, strict=True)][:MOST_LAWS]  # those of least weight say nothing
-    laws = tuple(LawFile(*file, one.excess, one.weight, one.chi_square) for file, one in pairs)
+    laws = tuple(LawFile(*file, one.excess, one.weight, one.chi_square, one.same_as) for file, one in pairs)
     content = RankingFile(
         laws, ranking.criterion, ranking.independent_frames, dict(ranking.failed), ranking.further, ranking.challenges
     )
@@ -125,7 +126,9 @@ def ranking_from_json(data: Any, source: str) -> Ranking:
     """The ranking of a document; source : its path, beside which the identifications of its laws lie."""
     path = Path(source)
     found = _ranking_file(data, path)
-    laws = tuple(RankedLaw(_fit_of_law(path, one), one.excess, one.weight, one.chi_square) for one in found.laws)
+    laws = tuple(
+        RankedLaw(_fit_of_law(path, one), one.excess, one.weight, one.chi_square, one.same_as) for one in found.laws
+    )
     if len({one.fit.provenance.get("data") for one in laws}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
     failed = MappingProxyType(found.failed)

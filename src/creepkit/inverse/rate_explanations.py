@@ -101,9 +101,8 @@ class RateExplanations:
 
     def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
         self.problem, self.x, self.free = problem, x, linear.free[: problem.parameter_count]
-        alike = replace(linear, residuals=linear.residuals.with_test_weights(np.ones(len(problem.histories))))
-        held = replace(alike, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
-        self.scatter = replace(rate_scatter(problem, alike, noise), members={})
+        held = replace(linear, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
+        self.scatter = replace(rate_scatter(problem, linear, noise), members={})
         self.held = rate_scatter(problem, held, noise)  # beside heats, whose rates would hide what stresses say
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J

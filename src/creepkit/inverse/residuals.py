@@ -319,6 +319,5 @@ def _masked_residuals(
         relative_noise=observations.relative_noise,
         discrepancy_unit=observations.discrepancy_unit,
         shared_noise=observations.shared_noise,
-        test_weights=np.ones(len(mask)),
     )
     return residuals.where(mask)

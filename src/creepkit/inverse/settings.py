@@ -55,7 +55,6 @@ class IdentificationSettings(Options, title="settings of an identification"):
         every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
         least squares of frames of equal weight, which describe tests best where no law explains them. "automatic",
         the default: "likelihood", but "noise" where a law misses the shape of curves (see inverse.identify.describing).
-    test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
         when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
@@ -78,9 +77,6 @@ class IdentificationSettings(Options, title="settings of an identification"):
         example="thickness=0.4935:0.027",
     )
     weights: Weights = option("automatic", "Of readings: by their likelihood; with noise all alike.")
-    test_loss: Literal["gaussian", "student"] = option(
-        "gaussian", "Of whole tests; with student one far from its replicates weighs less."
-    )
     suspect_frames: Literal["exclude", "keep"] = option("exclude", "Frames that unload, fall or lie apart.")
     further_laws: int = option(6, "Laws that are tried at most where none explains the tests.", Limits(0, 1000))
     rupture_times: Literal["auto", "use", "ignore"] = option(

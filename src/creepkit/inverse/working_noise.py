@@ -1,4 +1,4 @@
-"""Working noise: the noise model under which values are estimated, from the settings; robust weights of whole tests."""
+"""Working noise: the noise model under which values are estimated, from the settings."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from creepkit.arrays import Floats
-from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import (
     ASSUMED_RATE_SD,
     MINIMUM_TESTS,
@@ -33,10 +31,6 @@ from creepkit.inverse.variance_components import (
     restricted_log_likelihood,
 )
 from creepkit.records import is_logarithmic
-
-STUDENT_FREEDOM = 4.0
-"""Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
-
 
 AUTOCORRELATION_CONFIDENCE = 0.95
 """Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
@@ -233,22 +227,3 @@ def with_single_value_weight(working: NoiseModel, observations: ObservationVecto
         if curves.size:
             working = working.with_output(name, misfit=working[name].misfit / float(np.sqrt(np.mean(curves))))
     return working
-
-
-def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:
-    """(tests,) weights (nu + 1) / (nu + m / s): m the mean squared white residual of a test, s its median over tests.
-
-    Each output is taken on its own, and the worst one counts, if it is worse than the median: amplitudes far from
-    those of the twins are not hidden among good widths. Iterated with the fit this is the likelihood of tests that
-    scatter as Student's t does: one like the others weighs one, one of ten times their error a twentieth.
-    """
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    whitened = CovarianceFactor.of_residuals(unweighted, working).whiten(unweighted.values)
-    largest_ratio = np.zeros(len(whitened))
-    for position in range(len(working.outputs)):
-        mask = unweighted.present & (unweighted.output_index == position)
-        observed_tests = mask.any(axis=1)
-        mean_squares = (np.where(mask, whitened, 0.0) ** 2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1)
-        median_mean_square = max(float(np.median(mean_squares[observed_tests])), 1e-300)
-        largest_ratio = np.maximum(largest_ratio, mean_squares / median_mean_square)
-    return np.asarray((STUDENT_FREEDOM + 1) / (STUDENT_FREEDOM + np.maximum(largest_ratio, 1.0)))

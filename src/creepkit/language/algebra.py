@@ -367,10 +367,13 @@ GAROFALO = "Garofalo (1965), Fundamentals of Creep and Creep-Rupture in Metals, 
 
 def with_primary(law: Law) -> Law:
     """Multiply the rates of all terms by 1 + b exp(-strain / e_p); see CreepLaw.with_primary."""
-    if law.states or any(term.has(strain, time) for term in law.terms.values()):
+    for symbol, param in law.params.items():
+        if law.states and param.off is not None and any(one.has(time**symbol) for one in law.terms.values()):
+            law = _substituted(law, {symbol: sympy.Float(param.off)}, law.name, law.title)  # hardens by strain then
+    if any(term.has(strain, time) for term in law.terms.values()):
         raise LawError(
-            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress and "
-            "temperature alone, such as law('hyperbolic-sine')"
+            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress, "
+            "temperature and damage alone, such as law('hyperbolic-sine')"
         )
     params = {
         Symbol("b"): Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),

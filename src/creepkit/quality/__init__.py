@@ -181,8 +181,7 @@ def check_rig(histories: Sequence[History]) -> list[QualityFlag]:
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] = FRAME_FLAG_KINDS) -> list[History]:
     """The histories with their suspect frames unused, and a label `suspect` that says which and why.
 
-    kinds : "fracture", "unloading", "falling" and "outlier" or some of them. Whole tests are never dropped: a fit with
-    a robust loss of tests weighs them.
+    kinds : "fracture", "unloading", "falling" and "outlier" or some of them. Whole tests are never dropped.
     """
     for kind in kinds:
         if kind not in FRAME_FLAG_KINDS:

@@ -26,10 +26,10 @@ from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, as_text, listed, named, number, plural, printable
-from creepkit.reports.description import tested_range
+from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import CAUTIONS
+from creepkit.reports.words import BRACKETS, CAUTIONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -58,8 +58,16 @@ OTHER_EXPONENT = 0.1
 """Of the stress exponent, by which a value called n differs from it where this is said."""
 
 
+LEAST_WEIGHT = 0.01
+"""Of a law that is named beside the best."""
+
+
 NOTEWORTHY_EXPONENT = 0.15
 """Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
+
+
+BEYOND = {"h": "later", "%": "ruptured"}
+"""{unit: what an interval without an upper end says}, of times and of strains."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +95,7 @@ class KeyFigure:
     @property
     def text(self) -> str:
         """Value, interval and unit."""
-        unit = f" {self.unit}" if self.unit else ""
-        if math.isnan(self.low + self.high):
-            return f"{_written_out(self.value, 2)}{unit}"
-        digits = interval_digits(self.value, self.low, self.high)
-        value, low, high = (_written_out(v, digits) for v in (self.value, self.low, self.high))
-        return f"{value}{unit} [{low}, {high}]"
+        return interval_text((self.value, self.low, self.high), self.unit)
 
 
 def _written_out(value: float, digits: int) -> str:
@@ -123,10 +126,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    by_tests = f"{measured:.2g} by measured minimum rates" if math.isfinite(measured) else ""
+    by_tests = f"{measured:.2g} by minimum rates" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{by_rates.text} by measured minimum rates" if math.isfinite(heat) else ""
+        by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
@@ -179,13 +182,19 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     for one in wanted:
         hours, label = (one.median, one.low, one.high), f"time to {event_text(one)}"
         yield _with_interval(label, where, hours, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
-    predicted = [(name, one) for name, one in test.outputs.items() if np.isfinite(one.value).any()]
-    for name, output in [] if wanted else predicted[:1]:
-        k = int(np.flatnonzero(np.isfinite(output.value))[-1])
+    if not wanted:
+        yield from [replace(one, where=where, remark=test.extrapolated()) for one in end_figures(test)][:1]
+
+
+def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
+    """What the outputs of a test show at its end, or before it where they are predicted no longer."""
+    for name, one in test.outputs.items():
+        known = np.flatnonzero(np.isfinite(one.value))
         unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
-        values = (output.value[k], output.band.low[k], output.band.high[k])
-        label = f"{name.replace('_', ' ')} at {time_text(float(output.times[k]))}"
-        yield _with_interval(label, where, values, factor, unit, test.extrapolated())
+        for k in known[-1:]:
+            label = f"{name.replace('_', ' ')} at {time_text(float(one.times[k]))}"
+            values = (one.value[k], one.band.low[k], one.band.high[k])
+            yield _with_interval(label, test.history.condition, values, factor, unit)
 
 
 def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
@@ -200,15 +209,18 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     return [_of_mean(*one) for one in stated]
 
 
+def known_bounds(one: Any) -> tuple[float, float]:
+    """Of the mean, of a strength or a life: infinite where one of them is not known, NaN where none is."""
+    low, high = one.bounds_of_mean
+    if low is None and high is None:
+        return math.nan, math.nan
+    return (-math.inf if low is None else low), (math.inf if high is None else high)
+
+
 def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
-    low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
-    remark = f"by rupture methods, mean{', extrapolated beyond the tests' * bool(one.extrapolation)}"
+    low, high = known_bounds(one)
+    remark = f"mean of rupture methods{', extrapolated' * bool(one.extrapolation)}"
     return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
-
-
-def tests_text(fit: Identification) -> str:
-    """How many tests, and under which conditions."""
-    return f"{plural(len(fit.tests), 'test')}, {tested_range(fit)}"
 
 
 # ---- cautions --------------------------------------------------------------------------------------------------------
@@ -253,25 +265,25 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
         low = low / further if low > 0 else low - (high - low)
     wider = f"bounds = {{ {name} = [{number(low)}, {number(high)}] }}"
     end = "upper" if at_upper else "lower"
-    return _said("held", law=law, name=name, value=number(bound), end=end, wider=wider)
+    return CAUTIONS["held"].format(law=law, name=name, value=number(bound), end=end, wider=wider)
 
 
-def _said(kind: str, **values: object) -> str:
-    return CAUTIONS[kind].format(**values)
+RUNAWAY = 1.0
+"""Strain above what was measured, from which on a law has broken before the test."""
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield _said("not converged")
+        yield CAUTIONS["not converged"]
     if adequacy is None:
-        yield _said("unknown")
+        yield CAUTIONS["unknown"]
         return
     if adequacy.unpredicted:
-        yield _said("unpredicted", tests=named(adequacy.unpredicted, "test"))
+        yield CAUTIONS["unpredicted"].format(tests=named(adequacy.unpredicted, "test"))
     if adequacy.contradicting is not None:
-        yield _said("contradicting")
+        yield CAUTIONS["contradicting"]
     if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
@@ -281,12 +293,13 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
-        yield _said("worst", test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
+        kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
+        yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
-        yield _said("remedy", remedy=adequacy.remedies[0])
-    yield from (_said("implausible", nuisance=one.description) for one in adequacy.implausible[:1])
+        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
+    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield _said("noise unknown")
+        yield CAUTIONS["noise unknown"]
 
 
 def _test(fit: Identification, name: str) -> str:
@@ -301,8 +314,9 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
-        yield _said("undecided", laws=named(others, "law"))
-    yield from map(str, (ranking.challenges or ())[:1])
+        yield CAUTIONS["undecided"].format(laws=named(others, "law"))
+    same = f"{ranking.best.law.name} above "  # a threshold
+    yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
         yield from (unmet[name] for name in ("weight", "challenges") if name in unmet)
 
@@ -314,21 +328,21 @@ def _precision(fit: Identification) -> Iterator[str]:
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield _said(kind, by=by, names=named(names, "parameter"))
+            yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
+        yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
         kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield _said("not included", kinds=kinds, change=change)
+        yield CAUTIONS["not included"].format(kinds=kinds, change=change)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:
     if quality is not None and quality.flags:
         tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
-        yield _said("suspect", tests=named(tests, "test"))
+        yield CAUTIONS["suspect"].format(tests=named(tests, "test"))
 
 
 # ---- the answer ------------------------------------------------------------------------------------------------------
@@ -340,11 +354,13 @@ def answer(
     *,
     asked: Sequence[KeyFigure] = (),
     quality: DataQuality | None = None,
+    searched: Sequence[str] = (),
     **page: Any,
 ) -> Answer:
     """Headline, equations, values, key figures, cautions and what to do next, of the best law of a ranking if given.
 
-    asked : what forecasts say. quality : of the data. page : picture and files.
+    asked : what forecasts say. quality : of the data. searched : names of laws that a search of laws tried. page :
+    picture and files.
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
@@ -353,23 +369,28 @@ def answer(
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
     other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
+    figures = [*asked[:MOST_ASKED], *figures]
     return Answer(
         fit.headline,
+        tests_text(fit),
         titled_law(fit.law),
         equations(fit.law),
         [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
-        [(one.name, one.where, one.text, one.remark) for one in [*asked[:MOST_ASKED], *figures]],
+        [(one.name, one.where, one.text, one.remark) for one in figures],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
-        next_step(fit, ranking),
+        next_step(fit, ranking, searched),
         remarks,
+        brackets=BRACKETS * any("[" in one.text for one in figures),
         units=f"{Answer.units}{other}",
         **page,
     )
 
 
-def answer_text(fit: Identification, ranking: Ranking | None = None, more: object = ".details()") -> str:
+def answer_text(
+    fit: Identification, ranking: Ranking | None = None, more: object = ".details()", searched: Sequence[str] = ()
+) -> str:
     """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest."""
-    return as_text([answer(fit, ranking, more=str(more))])
+    return as_text([answer(fit, ranking, more=str(more), searched=searched)])
 
 
 def line_of_group(fit: Identification) -> str:
@@ -380,13 +401,15 @@ def line_of_group(fit: Identification) -> str:
 
 
 def chosen_text(ranking: Ranking) -> str:
-    """Whether the choice of the law is decisive, and the weights of the laws; weights do not say why one is not."""
-    weights = ", ".join(f"{one.fit.law.name} {one.weight:.2f}" for one in ranking.laws[:MOST_NAMED])
-    more = len(ranking.laws) - MOST_NAMED
-    decided = "decisive" if ranking.decisive else "not decisive"
-    if len(ranking.credible) == 1 and ranking.singled_out and ranking.challenges:
-        decided += f", {'but' if ranking.decisive else 'for'} the tests allow {ranking.challenges[0].subject} as well"
-    return f"{decided}; weights: {weights}{f' and {more} more' if more > 0 else ''}"
+    """Whether the choice of the law is decisive, and the weights of the laws; cautions say why one is not."""
+    laws, same = [one for one in ranking.laws if not one.same_as], ranking.same_functions
+    known = [f"{one.fit.law.name} {one.weight:.2f}" for one in laws[:MOST_NAMED] if one.weight >= LEAST_WEIGHT]
+    more = len(laws) - len(known)
+    others = f"; {plural(more, 'other')} below {LEAST_WEIGHT:g}" if more else ""
+    weights = f"weights: {', '.join(known)}{others}"
+    if len(known) == 1:
+        weights = f"weight {laws[0].weight:.2f} among {plural(len(laws), 'law')}"
+    return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}{same and f'; {same}'}"
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------
@@ -472,11 +495,15 @@ def reference_sentences(fit: Identification) -> list[str]:
     return lines
 
 
-def interval_text(values: tuple[float, ...]) -> str:
-    """A value with the ends of its interval, all with the digits in which they differ."""
-    value, low, high = values
-    digits = interval_digits(value, low, high)
-    return f"{number(value, digits)} [{number(low, digits)}, {number(high, digits)}]"
+def interval_text(values: Sequence[float], unit: str = "") -> str:
+    """A value with its unit and the ends of its interval, all with the digits in which they differ.
+
+    The value alone where an end is not known; an end that is infinite in words.
+    """
+    known, behind = not any(map(math.isnan, values[1:])), f" {unit}" if unit else ""
+    digits = interval_digits(*values) if known else 2
+    value, low, high = (_written_out(v, digits) if not math.isinf(v) else BEYOND.get(unit, "no limit") for v in values)
+    return f"{value}{behind} [{low}, {high}]" if known else f"{value}{behind}"
 
 
 FEWEST_DIGITS, MOST_DIGITS = 3, 7

@@ -24,8 +24,8 @@ LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
 
 
-MOST_LINES, WIDTH = 12, 100
-"""Of an answer in a terminal, and characters of a line."""
+MOST_LINES, WIDTH, LEAST_FOLDED = 12, 100, 30
+"""Of an answer in a terminal; characters of a line; and of the last column of a table, at the least."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,16 @@ class Table:
         numeric = [place for place, k in enumerate(kept) if k in self.numeric]
         return Table(self.caption, [self.columns[k] for k in kept], rows, numeric)
 
+    def folded(self, width: int) -> Table:
+        """The same with the last column on several lines where it would go beyond a width, or LEAST_FOLDED."""
+        before = [max(len(str(row[k])) for row in (self.columns, *self.rows)) for k in range(len(self.columns) - 1)]
+        room, rows = max(width - sum(before) - 2 * len(before), LEAST_FOLDED), list[list[Cell]]()
+        for row in self.rows:
+            first, *more = wrap(str(row[-1]), room) or [""]
+            rows.append([*row[:-1], first])
+            rows += [[*[""] * len(before), part] for part in more]
+        return Table(self.caption, self.columns, rows, self.numeric)
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -125,25 +135,28 @@ class Downloads:
 class Answer:
     """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
 
-    remarks : on the choice of the law. values : (symbol, value, ends of its interval, unit) of the parameters.
+    tests : how many, under which conditions. remarks : on the choice of the law. values : (symbol, value, ends of its
+    interval, unit) of the parameters.
     picture : a Picture, or the Paragraph that says why there is none.
-    more : what shows the rest. units : of the values.
+    more : what shows the rest. units : of the values. brackets : what the intervals of figures hold.
     figures : (name, where it holds, value with interval, remark).
     """
 
     kind: ClassVar[str] = "answer"
     headline: str
-    law: Cell
-    equations: Sequence[Rich]
-    values: Sequence[Sequence[Any]]
-    figures: Sequence[Sequence[str]]
-    cautions: Sequence[str]
-    next_step: str
+    tests: str
+    law: Cell = ""
+    equations: Sequence[Rich] = ()
+    values: Sequence[Sequence[Any]] = ()
+    figures: Sequence[Sequence[str]] = ()
+    cautions: Sequence[str] = ()
+    next_step: str = ""
     remarks: Sequence[str] = ()
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
     more: str = ".details()"
     units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
+    brackets: str = ""
 
 
 Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
@@ -189,6 +202,12 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
+def plural_of(name: str) -> str:
+    """Several of a thing by its name in a file: 'rupture times', 'stresses', 'laboratories'."""
+    word = name.replace("_", " ")
+    return f"{word[:-1]}ies" if word.endswith("y") else f"{word}es" if word.endswith("s") else f"{word}s"
+
+
 def listed(words: Sequence[str]) -> str:
     """Words with commas, and 'and' before the last."""
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0] if words else "none"
@@ -220,9 +239,12 @@ _NAME = re.compile(r"(?![aA] )(?:[^\W\d_](?![^\W_]))|[\w-]*[_*0-9]\w*")
 
 
 def typeset(text: str) -> str:
-    """The same with powers of ten, signs and infinity as they are printed: 4.2e-05 as 4.2 × 10⁻⁵, -3 with a minus."""
+    """The same with powers of ten, signs and infinity as they are printed: 4.2e-05 as 4.2 × 10⁻⁵, -3 with a minus.
+
+    No line ends between a number and its unit.
+    """
     text = _POWER.sub(_with_power, text.replace(" +- ", " ± "))
-    return _INFINITE.sub("∞", _MINUS.sub("−", text))
+    return _UNIT.sub("\u00a0", _INFINITE.sub("∞", _MINUS.sub("−", text)))
 
 
 _POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)
@@ -233,9 +255,13 @@ _MINUS, _INFINITE = re.compile(r"(?:^|(?<=[\[( ]))-(?=[\d∞]|inf\b)"), re.compi
 """Before a number, and what programs print of one that has no end."""
 
 
+_UNIT = re.compile(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:°C|%|[GMk]?Pa|1/s|k?J/mol|[hsKN]|kN|[mµn]?m)(?![^\W\d_]))")
+"""The space between a number and its unit."""
+
+
 def _with_power(found: re.Match[str]) -> str:
     power = str(int(found[2])).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"10{power}" if found[1] == "1" else f"{found[1]} × 10{power}"
+    return f"10{power}" if found[1] == "1" else f"{found[1]}\u00a0×\u00a010{power}"
 
 
 # ---- as text ---------------------------------------------------------------------------------------------------------
@@ -267,7 +293,7 @@ def _lines(block: Block) -> list[str]:
     if isinstance(block, Items):
         return [f"- {item}" for item in block.items]
     if isinstance(block, Table):
-        table = block.filled
+        table = block.filled.folded(WIDTH - 2)
         lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
         return ["", *([f"{table.caption}:"] if table.caption else []), *lines, ""]
     if isinstance(block, Formula):
@@ -278,23 +304,25 @@ def _lines(block: Block) -> list[str]:
 
 
 def _answer_lines(answer: Answer) -> list[str]:
-    """MOST_LINES lines, none longer than WIDTH; cautions and figures without room among them stand in the details."""
+    """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details."""
     pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
-    pieces.append(f"({answer.units})")
-    lines = wrap(answer.headline, WIDTH)
-    for text in (*answer.remarks, *map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
+    pieces += [f"({answer.units})"] if pieces else []
+    head, lines = _indented(f"{answer.headline} ({answer.tests})", ""), list[str]()
+    for text in (*map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
         lines += _indented(text)
+    remarks = [*map(_indented, answer.remarks)]
     figures = [f"{name} at {where}: {value}{remark and ', '}{remark}" for name, where, value, remark in answer.figures]
     said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
     end = _indented(f"next: {answer.next_step}; more: {answer.more}")
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
-    for parts, least in ((warned, 1), (said, 0)):
-        while len(parts) > least and sum(map(len, (lines, *said, *warned, end))) > MOST_LINES:
+    for parts, least in ((warned, 1), (said, 1), (remarks, 0), (said, 0)):
+        while len(parts) > least and sum(map(len, (head, *remarks, lines, *said, *warned, end))) > MOST_LINES:
             parts.pop()
-    return [*lines, *chain(*said, *warned), *end]
+    return [*head, *chain(*remarks), *lines, *chain(*said, *warned), *end]
 
 
-def _indented(text: str) -> list[str]:
+def _indented(text: str, first: str = "  ") -> list[str]:
     """Lines of a text, indented by two and four; blanks that do not break hold the pieces of a value together."""
-    lines = wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_long_words=False)
+    text = _UNIT.sub("\u00a0", text)
+    lines = wrap(text, WIDTH, initial_indent=first, subsequent_indent=2 * first, break_long_words=False)
     return [line.replace("\u00a0", " ") for line in lines]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-USED, SAME, LABELS = (0.15, 0.8), 1e-6, 5
+USED, SAME, LABELS = (0.15, 0.65), 1e-6, 5
 """Of a colour map, whose palest colours cannot be seen on white, nor its darkest told apart on a dark page; the
 relative difference of conditions that are one; and labels along a colour bar, its ends among them."""
 

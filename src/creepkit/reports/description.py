@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import ends
+from creepkit.reports.blocks import ends, plural, plural_of
 from creepkit.reports.words import HEADLINES, TRUTHS
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Description:
         known = [(f"rupture times{lost}", self.ruptures), ("minimum creep rates", self.minimum_rates)]
         known += [("creep rates", self.rates)]
         order = sorted(self.outputs, key=lambda name: not is_logarithmic(name))
-        known += [(_plural(name), _as_ln(name, self.outputs[name])) for name in order]
+        known += [(plural_of(name), _as_ln(name, self.outputs[name])) for name in order]
         return [(name, value) for name, value in known if np.isfinite(value)][:MOST_DESCRIBED]
 
 
@@ -82,22 +82,31 @@ def spread_text(spread: float) -> str:
 
 
 def headline(fit: Identification) -> str:
-    """What the law is to be used for, within how much and where, then whether it could be the true one."""
-    items = Description.of(fit).items()
+    """What the law is to be used for and where, with its mean misfit, then whether it could be the true one."""
+    items, adequacy = Description.of(fit).items(), fit.adequacy
+    misfits = [f"{name} ({'mean misfit ' * (k == 0)}{spread_text(value)})" for k, (name, value) in enumerate(items)]
     good, bad = (
-        [f"{n} within {spread_text(v)}" for n, v in items if (v <= USABLE) is usable] for usable in (True, False)
+        [said for said, (_, value) in zip(misfits, items, strict=True) if (value <= USABLE) is usable]
+        for usable in (True, False)
     )
     values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
-    longest = fit.ranges["time"][1]
-    where = f"{tested_range(fit)}, to {time_text(longest)}" if longest > 0.0 else tested_range(fit)
-    values |= {"where": f" ({where})", "described": f"; {' and '.join(good + bad)} so far" if items else ""}
-    kind = "use in part" if good and bad else "use" if good else "use nothing" if bad else "fitted"
+    values["described"] = f"; {' and '.join(misfits)} so far" if items else ""
+    contradicted = adequacy is not None and adequacy.rejects and not adequacy.lies_in_tests
+    kind = f"{'between' if contradicted else 'use'}{' in part' * bool(bad)}"
+    kind = kind if good else "use nothing" if bad else "fitted"
     return HEADLINES[kind if fit.converged else "not found"].format(**values)
 
 
 def tested_range(fit: Identification) -> str:
     """Stresses and temperatures of the tests."""
     return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+
+
+def tests_text(fit: Identification) -> str:
+    """How many tests, under which conditions and until when."""
+    longest = fit.ranges["time"][1]
+    until = f", to {time_text(longest)}" if longest > 0.0 else ""
+    return f"{plural(len(fit.tests), 'test')}, {tested_range(fit)}{until}"
 
 
 def _truth(fit: Identification) -> str:
@@ -114,11 +123,6 @@ def _truth(fit: Identification) -> str:
     else:
         kind = "shape" if adequacy.misses_shape() else "noise"
     return TRUTHS[kind]
-
-
-def _plural(name: str) -> str:
-    word = name.replace("_", " ")
-    return f"{word}es" if word.endswith("s") else f"{word}s"
 
 
 def _spread(ratios: list[float]) -> float:

@@ -13,12 +13,12 @@ from creepkit.errors import FitError
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
-from creepkit.reports.answer import event_text
+from creepkit.reports.answer import end_figures, event_text
 from creepkit.reports.blocks import Block, Items, Paragraph, as_text
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
-from creepkit.reports.prediction_bands import axis_label, unit_of
+from creepkit.reports.prediction_bands import axis_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
 
 def _lines(test: TestForecast) -> Iterator[str]:
     """Outputs at the end, times, what the law misses, a measurement, what the band is made of, cautions."""
-    yield from map(_end_text, test.outputs.values())
+    yield from (f"{one.name}: {one.text}" for one in end_figures(test))
     yield from (_time_text(one, float(test.history.times[-1])) for one in test.times)
     if test.misfit is not None:
         yield misfit_sentence(test.misfit)
@@ -86,18 +86,6 @@ def misfit_sentence(misfit: LawMisfit) -> str:
         f"when the others predict them, the law misses the rate of the nearest tests, at {where}, by a factor of "
         f"{factor:.3g}; what it misses here is in the intervals, as a factor of {misfit.factor:.3g} on the rate"
     )
-
-
-def _end_text(one: OutputForecast) -> str:
-    alive = np.flatnonzero(np.isfinite(one.value) & np.isfinite(one.band.low))
-    unit = f" {unit_of(one.output)}" if unit_of(one.output) else ""
-    if not alive.size:
-        return f"{one.output}: nothing is predicted"
-    k = int(alive[-1])
-    value, low, high = (_scaled(one) * v[k] for v in (one.value, one.band.low, one.band.high))
-    end = f"{high:.3g}" if math.isfinite(high) else "ruptured"
-    hours = hours_number(float(one.times[k]))
-    return f"{one.output.replace('_', ' ')} at {hours} h: {value:.3g}{unit} [{low:.3g}, {end}]"
 
 
 def _time_text(one: TimeForecast, end: float) -> str:

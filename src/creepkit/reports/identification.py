@@ -16,7 +16,7 @@ from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import NOT_INCLUDED, beyond_intervals
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
-from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
+from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION, Correlation
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text
@@ -244,20 +244,18 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
-                number(test.weight, 2),
                 *_single_cells(None if first is not None else test.minimum_rate),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "weight", "minimum rate, 1/s", "by the law", "law / measured"),
+        *("rate × law", "minimum rate, 1/s", "by the law", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
     caption = (
         f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
-        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture. Weight in the "
-        "fit: 1 as any other, less for one far from the others"
+        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture"
     )
     if any(t.minimum_rate or t.rupture for t in fit.tests):
         caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
@@ -293,8 +291,7 @@ def _sums(fit: Identification) -> list[str]:
 
 def _if_the_law_holds(fit: Identification) -> str:
     """The condition of intervals of single tests."""
-    contradicted = fit.adequacy is not None and fit.adequacy.verdict == "leaves a discrepancy"
-    return ", which they do not have: the tests contradict the law" if contradicted else ", if the law holds"
+    return ", which they do not have: the tests contradict the law" if rejected(fit) else ", if the law holds"
 
 
 def _without_misfit(fit: Identification) -> list[str]:
@@ -417,9 +414,8 @@ def _correlations(fit: Identification) -> list[Block]:
         return []
     if len(names) > MOST_CORRELATED:
         return [Paragraph(f"the correlations of {len(names)} parameters are in the file of the identification")]
-    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, matrix, strict=True)]
     caption = f"correlations of the estimates of {fit.law.name}; ln where the logarithm is estimated"
-    table = Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
+    table = correlation_table(correlation, caption)
     size = np.abs(np.triu(matrix, 1))
     if not size.max() > STRONG_CORRELATION:
         return [table]
@@ -430,6 +426,13 @@ def _correlations(fit: Identification) -> list[Block]:
         "interval; carry all digits, and take uncertainties of rates from the covariance, which is among the files"
     )
     return [table, Paragraph(together, "warning")]
+
+
+def correlation_table(correlation: Correlation, caption: str = "") -> Table:
+    """The matrix with its names."""
+    names = correlation.names
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
+    return Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
 
 
 # ---- comments of exports ---------------------------------------------------------------------------------------------

@@ -21,7 +21,6 @@ from creepkit.reports.prediction_bands import (
     axis_label,
     curve_of_test,
     fitted_curves,
-    line_style,
     set_time_range,
     unit_of,
 )
@@ -195,7 +194,7 @@ def _draw_curves(
     for k, curve in zip(tests, drawn, strict=True):
         alike = sum(fit.tests[other].condition == fit.tests[k].condition for other in tests)
         opacity = 1.0 - (1.0 - BAND_OPACITY) ** (1.0 / alike)  # bands of one condition lie upon each other
-        draw_curve(axes, curve, colours[k], line_style(fit.tests[k].weight), colours[k], opacity)
+        draw_curve(axes, curve, colours[k], "-", colours[k], opacity)
     set_curve_ranges(axes, drawn, output)
     axes.set(xlabel="time, h", ylabel=axis_label(output))
 
@@ -279,7 +278,7 @@ def _draw_residuals(axes: Axes, fit: Identification, curve: TestCurve, output: s
         axes.axhspan(-NOISE_BAND, NOISE_BAND, color="black", alpha=0.1, lw=0)
     reach = 1.15 * float(np.quantile(np.abs(values), SHOWN_QUANTILE)) if values.size else 0.0
     limit = max(reach, LEAST_RANGE if judged else 0.0) or 1.0
-    axes.plot(hours, values, line_style(fit.tests[k].weight), lw=0.9, color=colour, alpha=0.85)
+    axes.plot(hours, values, lw=0.9, color=colour, alpha=0.85)
     for sign, marker in ((1.0, "^"), (-1.0, "v")):
         outside = sign * values > limit
         if outside.any():  # a line without points would collapse the layout

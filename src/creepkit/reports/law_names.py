@@ -35,8 +35,8 @@ COMMON_WORD = re.compile(
 """At the beginning of a title, small within a sentence; other words may be names of people."""
 
 
-DEPENDENCE = re.compile(r" with [\w -]+ temperature dependence$")
-"""At the end of a title of a law with temperature, which its equation shows."""
+DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence\b")
+"""In the title of a law with temperature, which its equation shows."""
 
 
 def title_in_sentence(law: CreepLaw) -> str:
@@ -95,7 +95,7 @@ def definition_blocks(laws: Iterable[CreepLaw]) -> list[Block]:
     for k, law in enumerate(shown, start=1):
         blocks.append(Paragraph(f"Eq. ({k}): {title_in_sentence(law)}"))
         blocks += map(Formula, equations(law))
-        blocks.append(_symbols(k, law))
+        blocks.append(symbols_table(f"Symbols of Eq. ({k})", law))
     if any("=" in law.title for law in shown):
         blocks.append(Paragraph("A title that ends with a parameter and a value says that it was fixed there.", "note"))
     blocks.append(_variables(shown))
@@ -107,7 +107,7 @@ def definition_blocks(laws: Iterable[CreepLaw]) -> list[Block]:
     return [*blocks, Verbatim("The same equations in LaTeX", printable_lines("\n".join(latex)))]
 
 
-def _symbols(k: int, law: CreepLaw) -> Table:
+def symbols_table(caption: str, law: CreepLaw) -> Table:
     """The parameters and internal variables of a law."""
     symbols = symbols_of(law)
     rows = [
@@ -119,7 +119,7 @@ def _symbols(k: int, law: CreepLaw) -> Table:
         meaning = f"internal variable, {state.initial:g} before loading{end}"
         rows.append((_symbol(symbol), meaning, "1", "–"))
     columns = ("symbol", "meaning", "unit", "bounds of the search")
-    return Table(f"Symbols of Eq. ({k})", columns, rows)
+    return Table(caption, columns, rows)
 
 
 def _symbol(symbol: sympy.Symbol) -> Rich:

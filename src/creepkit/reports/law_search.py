@@ -29,7 +29,8 @@ def law_search_text(search: LawSearch) -> str:
     ]
     columns = ("law", "parameters", "complexity", "rms ln strain", "BIC - best", "on the front")
     table = Table("no simpler law than one on the front has a smaller misfit", columns, rows, numeric=(1, 2, 3, 4))
-    return f"{answer_text(search.best, search.ranking)}\n\n{as_text([table, Paragraph(effort_text(search))])}"
+    answer = answer_text(search.best, search.ranking, searched=[one.law.name for one in search.tried])
+    return f"{answer}\n\n{as_text([table, Paragraph(effort_text(search))])}"
 
 
 def effort_text(search: LawSearch) -> str:

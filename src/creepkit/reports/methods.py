@@ -48,7 +48,6 @@ CITATIONS = {
     "wilshire": "B. Wilshire, A. J. Battenbough (2007), Mater. Sci. Eng. A 443, 156",
     "monkman-grant": "F. C. Monkman, N. J. Grant (1956), Proc. ASTM 56, 593",
     "lindley": "D. V. Lindley (1956), Ann. Math. Stat. 27, 986-1005",
-    "student": "K. L. Lange, R. J. A. Little, J. M. G. Taylor (1989), J. Am. Stat. Assoc. 84, 881-896",
     "pysindy": "B. M. de Silva et al. (2020), J. Open Source Softw. 5(49), 2104",
     "creepkit": f"The authors of creepkit, creepkit (software), version {version('creepkit')}, licence Apache-2.0",
 }
@@ -219,8 +218,6 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
             "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
             f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
         )
-    if settings.test_loss == "student":
-        yield f"Tests far from the others have less weight by Student's distribution{cite('student')}."
     if fit.numerical_error is not None:
         yield "Numerical errors of predictions were corrected at the optimum; a tenth of them stays in the covariance."
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from creepkit.inverse.selection.ranking import Ranking
 
 
-def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
-    """What to do now, in one sentence without a full stop."""
+def next_step(fit: Identification, ranking: Ranking | None = None, searched: Sequence[str] = ()) -> str:
+    """What to do now, in one sentence without a full stop. searched : names of laws that a search of laws tried."""
     adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
     names, laws = named(weak, "parameter"), [] if ranking is None else [r.fit for r in ranking.laws]
     if not fit.converged:
@@ -30,9 +30,9 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
     if adequacy is not None and adequacy.in_tests is not None:
         return adequacy.in_tests.next_step
     if adequacy is not None and adequacy.rejects:
-        if further := law_to_try(fit, [one.law.name for one in laws]):
+        if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])
-        return NEXT["laws" if len(laws) < 2 else "within"]
+        return NEXT["laws" if len(laws) < 2 else "search laws" if _are_bars(fit) and not searched else "within"]
     if adequacy is not None and adequacy.verdict == "cannot be judged" and adequacy.not_judged != (RUPTURE_OUTPUT,):
         stated = [one for one in adequacy.not_judged if one != RUPTURE_OUTPUT] or ["strain"]
         unit = "_1/s" if stated[0] == MINIMUM_RATE_OUTPUT else ""
@@ -42,8 +42,8 @@ def next_step(fit: Identification, ranking: Ranking | None = None) -> str:
             return _test_text("separate", fit, ranking.credible[1].fit)
         if ranking.challenges:
             first = ranking.challenges[0]
-            kind = "measure" if first.kind == "unmodelled effect" else "separate otherwise"
-            return NEXT[kind].format(first=fit.law.name, second=first.subject, effect=first.subject)
+            kinds = {"unmodelled effect": "measure", "threshold": "threshold", "sum": "separate otherwise"}
+            return NEXT[kinds[first.kind]].format(first=fit.law.name, second=first.subject, effect=first.subject)
     return _test_text("determine", fit, names=names) if weak else NEXT["use"]
 
 
@@ -102,9 +102,7 @@ def further_test(fit: Identification, other: Identification | None) -> tuple[flo
     that between the laws. It takes no longer than LONGER times the longest test until the strain of the reference
     point. None of tests other than bars, and where the laws differ by less than SEPARATE standard deviations.
     """
-    if not fit.histories or any(
-        "strain" not in one.outputs or one.loading.quantity != "stress" for one in fit.histories
-    ):
+    if not _are_bars(fit):
         return None
     low, high = fit.ranges["stress"]
     kelvin = sorted({round(T, 1) for one in fit.histories for T in held_temperatures(one)})
@@ -125,6 +123,13 @@ def further_test(fit: Identification, other: Identification | None) -> tuple[flo
     if value[k] < (0.0 if other is None else SEPARATE):
         return None
     return float(stress[k]), float(T[k]), float(hours[k]), float(factor[k])
+
+
+def _are_bars(fit: Identification) -> bool:
+    """Whether all tests are creep curves of bars."""
+    return bool(fit.histories) and all(
+        "strain" in one.outputs and one.loading.quantity == "stress" for one in fit.histories
+    )
 
 
 BEYOND, LONGER, SHORTER = (0.8, 1.25), 3.0, 100.0

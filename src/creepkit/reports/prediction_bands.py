@@ -7,7 +7,7 @@ C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One predicti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -118,10 +118,6 @@ PLOTTED_STRAIN_RATIO = 0.02
 """Differences of logarithms of strains are taken where a test's strain exceeds this share of its last one."""
 
 
-DASHED_BELOW_WEIGHT = 0.5
-"""Weight below which a test is drawn dashed."""
-
-
 @dataclass(frozen=True, eq=False)
 class TestCurve:
     """One output of one test, as it is drawn.
@@ -187,11 +183,6 @@ def axis_label(output: str) -> str:
     """Name and unit of an output."""
     name = output.replace("_", " ")
     return f"{name}, {unit_of(output)}" if unit_of(output) else name
-
-
-def line_style(weight: float) -> Literal["-", "--"]:
-    """Of the curves of a test by its weight in the fit."""
-    return "--" if weight < DASHED_BELOW_WEIGHT else "-"
 
 
 def set_time_range(axes: Axes, hours: Floats, output: str) -> None:

@@ -1,4 +1,4 @@
-"""What a ranking of laws says: the laws with misfits and weights, what separates them, and the values of each."""
+"""What a ranking of laws says: the laws with misfits and weights, and what else the tests allow."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
 from creepkit.reports.identification import scatter_of_rates
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
@@ -49,14 +48,12 @@ def ranking_text(ranking: Ranking) -> str:
 
 
 def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str = "") -> list[Block]:
-    """The laws tried with misfits and weights, what separates them, and with `figures` the misfit of each law.
+    """The laws tried with misfits and weights, and with `figures` the misfit of each law in each test.
 
     of : the material, " of CMSX-4".
     """
     blocks: list[Block] = [_table(ranking)]
     blocks += [Paragraph(CHI_SQUARE_NOTE, "note")] if any(math.isfinite(one.chi_square) for one in ranking.laws) else []
-    separation = separating_test(ranking)
-    blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
     if ranking.failed:
@@ -65,7 +62,7 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
             f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
-            f"and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
+            f"and the curves of the credible ones. Weights: {weights}."
         )
         caption = f"Where the laws differ: {misfit_name(ranking)}."
         title = f"Misfit of each law in each test{of}"
@@ -78,78 +75,23 @@ def _table(ranking: Ranking) -> Table:
         (
             titled_law(one.fit.law),
             str(len(one.fit.law.params)),
-            *_misfit(one.fit),
+            ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
+            scatter_of_rates(one.fit),
             number(one.excess, 3),
-            f"{one.weight:.3f}",
+            f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
             explanation(one.fit),
         )
         for one in ranking.laws
     ]
-    columns = (
-        *("law", "parameters", _misfit_name(ranking.best), "test to test", f"{criterion_name(ranking)} - best"),
-        *("weight", "chi-square", "by the noise of the tests"),
-    )
-    return Table("laws tried, the best first", columns, rows, numeric=(1, 2, 3, 4, 5, 6))
+    behind = f"{ {'bic': 'BIC', 'aicc': 'AICc'}[ranking.criterion] } - best"
+    columns = ("law", "parameters", "mean misfit", "test to test", behind, "weight", "chi-square", "by the noise")
+    return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
 
 
 def explanation(fit: Identification) -> str:
     """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
     return "?" if fit.adequacy is None else fit.adequacy.verdict_text
-
-
-def criterion_name(ranking: Ranking) -> str:
-    """The abbreviation of the criterion by which laws are ranked."""
-    return {"bic": "BIC", "aicc": "AICc"}[ranking.criterion]
-
-
-def _misfit_name(fit: Identification) -> str:
-    """What _misfit says first: of the first output, else of minimum rates, else of rupture times."""
-    if fit.errors:
-        output = next(iter(fit.errors))
-        return f"rms ln {output}" if is_logarithmic(output) else f"error of {output}"
-    return f"rms ln {'minimum rate' if any(m.minimum_rate for m in fit.tests) else 'rupture time'}"
-
-
-def _misfit(fit: Identification) -> tuple[str, str]:
-    """The misfit of the first output, or of tests without frames, and the scatter of rates between tests."""
-    if fit.errors:
-        output = next(iter(fit.errors))
-        return f"{fit.rms:.3f}" if is_logarithmic(output) else (
-            f"{fit.errors[output].relative_squared_error:.3g}"
-        ), scatter_of_rates(fit)
-    rates = [m.minimum_rate.ratio for m in fit.tests if m.minimum_rate is not None]
-    ratios = rates or [m.rupture.ratio for m in fit.tests if m.rupture is not None and not m.rupture.censored]
-    logarithms = [math.log(ratio) for ratio in ratios if 0.0 < ratio < math.inf]
-    rms = math.sqrt(sum(x * x for x in logarithms) / len(logarithms)) if logarithms else math.nan
-    return f"{rms:.3f}", scatter_of_rates(fit)
-
-
-def separating_test(ranking: Ranking) -> list[str]:
-    """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
-    if len(ranking.laws) < 2 or len(ranking.best.tests) < 2:
-        return []
-    fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
-    if any(fit.linearised is None for fit in fits):
-        fits = fits[:2]  # others cost a prediction each
-    if any(fit.linearised is None and (not fit.histories or fit.predictor is None) for fit in fits):
-        return []
-    try:
-        chi_square = chi_square_by_test(fits)
-    except CreepkitError:
-        return []
-    differences = chi_square[1] - chi_square[0]
-    if not np.isfinite(differences).all():
-        return []
-    if min(float(differences.sum()), second.excess) < DISTINGUISHABLE_CHI_SQUARE:
-        return []
-    k, name = int(np.argmax(differences)), second.fit.law.name
-    share = 100 * float(differences[k]) / float(np.maximum(differences, 0.0).sum())
-    return [
-        f"what separates {name} from {fits[0].law.name} most is test {fits[0].tests[k].name} "
-        f"({fits[0].tests[k].condition}): {share:.0f} % of the chi-square that speaks against {name} is its own; "
-        f"{criterion_name(ranking)} of {name} is {number(second.excess, 3)} larger in all"
-    ]
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[str]:
@@ -169,8 +111,8 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     """Print the table of laws, the answer, and what was written."""
     table = _table(ranking)
     print_table(f"{test_count} tests", table.columns, [[*map(str, row)] for row in table.rows])
-    files = [path.name for path in written if path.suffix == ".json"]
-    tell(f"{answer_text(ranking.best, ranking, f'creepkit report {files[-1]}' if files else 'creepkit report')}\n")
+    files = [path for path in written if path.suffix == ".json"]  # the ranking, where there are several laws
+    tell(f"{answer_text(ranking.best, ranking, ' '.join(('creepkit report', *map(str, files[:1]))))}\n")
     for path in written:
         tell_written(path)
 

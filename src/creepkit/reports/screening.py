@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.reports.blocks import aligned
+from creepkit.reports.answer import interval_text
+from creepkit.reports.blocks import Paragraph, Table, as_text
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
-from creepkit.reports.terminal import print_json, print_table, tell
+from creepkit.reports.terminal import print_json, tell
 from creepkit.screening.results import (
     COMPARISON_STRESS,
     AlloyResult,
@@ -39,7 +39,7 @@ def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
 
 def screening_text(plate: ScreeningResult) -> str:
     """The table, the share of each law in each class, and what failed."""
-    return "\n".join([*aligned(TABLE_COLUMNS, table_rows(plate)), "", *summary_lines(plate)])
+    return as_text([Table("", TABLE_COLUMNS, table_rows(plate)), *map(Paragraph, summary_lines(plate))])
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:
@@ -70,16 +70,11 @@ def _table_row(plate: ScreeningResult, result: AlloyResult) -> tuple[str, ...]:
         *first_cells,
         names,
         f"{result.laws[0].weight:.2f}",
-        _interval_text(fit.rate(COMPARISON_STRESS, warn=False), 3),
-        _interval_text(fit.local_exponent(COMPARISON_STRESS, warn=False), 3),
+        interval_text(tuple(map(float, fit.rate(COMPARISON_STRESS, warn=False)))),
+        interval_text(tuple(map(float, fit.local_exponent(COMPARISON_STRESS, warn=False)))),
         f"{mean_chi_square(fit):.3g}",
         confirmation_text(result),
     )
-
-
-def _interval_text(interval: Sequence[Any], digits: int) -> str:
-    value, low, high = (float(v) for v in interval)
-    return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"
 
 
 def _failure_text(alloy: str, failure: str) -> str:
@@ -140,9 +135,8 @@ def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) 
     if as_json:
         print_json(_plate_to_json(plate, written))
         return
-    print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
-    for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
-        tell(line)
+    for text in (plate, *(f"wrote {path}" for path in written)):
+        tell(text)
 
 
 def _plate_to_json(plate: ScreeningResult, written: list[Path]) -> dict[str, Any]:

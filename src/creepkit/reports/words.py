@@ -7,21 +7,23 @@ the result puts in.
 from __future__ import annotations
 
 HEADLINES = {
-    "use": "use {law} for {good}{where}; {truth}",
-    "use in part": "use {law} for {good}, not {bad}{where}; {truth}",
-    "use nothing": "do not use {law}: {bad} at best; {truth}",
+    "use": "use {law} for {good}; {truth}",
+    "use in part": "use {law} for {good}, not {bad}; {truth}",
+    "between": "use {law} between the tests only, for {good}; {truth}",
+    "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
+    "use nothing": "do not use {law}: it misses {bad}; {truth}",
     "fitted": "{law} was fitted; {truth}",
     "not found": "do not use {law} yet: the search for its values did not converge{described}",
 }
-"""{kind: the first line of an answer}. where : the range of the tests."""
+"""{kind: the first line of an answer}."""
 
 
 TRUTHS = {
     "not judged": "whether it is the true law cannot be judged",
     "explains": "the tests do not contradict it",
-    "explained": "but {cause}",
-    "two exponents": "but by it minimum rates contradict rupture times",
-    "shape": "but curves differ in shape",
+    "explained": "{cause}",
+    "two exponents": "by it minimum rates contradict rupture times",
+    "shape": "curves differ in shape",
     "noise": "the tests differ from it by more than their noise",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
@@ -34,6 +36,7 @@ CAUTIONS = {
     "unpredicted": "it does not predict every reading of {tests}",
     "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
     "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
+    "runs away": "it is worst in {test}: by the law it has broken by {time}",
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
     "implausible": "it takes {nuisance}, far from what was stated",
     "noise unknown": "the noise of readings is not known: the law cannot be judged",
@@ -51,16 +54,39 @@ NEXT = {
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
     "law": "try {law} as well, for {why}",
     "laws": "compare it with other laws that suit the tests (creepkit init)",
-    "within": "use it between the tests only: beyond them its misfit grows",
+    "search laws": "search laws that nobody wrote down (creepkit identify TESTS --search)",
+    "within": "forecast between the tests only (creepkit predict): beyond them its misfit grows",
     "noise": "state the noise of the readings in a column {column}",
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     "determine otherwise": "make a test that determines {names} (creepkit design)",
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
 }
 """{kind: what to do now}."""
+
+
+BRACKETS = (
+    "In brackets: 95 % intervals; those of forecasts and lives hold one new test. "
+    "The mean misfit is over the tests that were fitted."
+)
+"""Below the numbers of an answer."""
+
+
+RUPTURE = {
+    "several": "use the mean of {names}: the tests cannot tell them apart",
+    "decisive": "use {best}, which passes all checks",
+    "single": "use {best}, which has nearly all the weight",
+    "only": "use {best}, the only method that was fitted",
+    "fails": "{best} fails: {check}",
+    "extrapolated": "strengths at {hours} h are extrapolated: the longest test has {longest} h",
+    "longer": "test to {hours} h: strengths beyond three times the longest test are extrapolated",
+    "check": "look at the tests of the check that fails",
+    "strengths": "use these strengths with their bounds",
+}
+"""{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
 
 
 TRY = {

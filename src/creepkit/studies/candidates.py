@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search_options import SearchOptions
+    from creepkit.inverse.candidate_laws import SearchOptions
     from creepkit.inverse.selection import Ranking
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.language import CreepLaw

@@ -18,8 +18,7 @@ from creepkit.exporters.exporting import ExportOptions
 from creepkit.extraction.options import ClockOptions, ExtractionOptions
 from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.instruments.reading_options import RecordOptions
-from creepkit.inverse.candidate_laws import LawChanges
-from creepkit.inverse.search_options import SearchOptions
+from creepkit.inverse.candidate_laws import LawChanges, SearchOptions
 from creepkit.inverse.settings import IdentificationSettings, UsualErrors
 from creepkit.options import Options, table_of
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings

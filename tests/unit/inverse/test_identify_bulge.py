@@ -105,28 +105,6 @@ def test_intervals_cover_where_thicknesses_and_rates_scatter():
     assert held >= 30
 
 
-# ---- what pulls how hard -------------------------------------------------------------------------------------------
-
-
-def test_a_bad_test_loses_its_pull():
-    """One of seven creeps at 0.35 of its rate: with student the exponent and Q stay, and the test is named."""
-    bad = [replace(p, thickness=0.5) for p in PLANS]
-    bad[1] = replace(bad[1], rate=0.35)
-    tests = planted(LAW, TRUTH, bad, seed=4, frames=24)
-    plain, robust = (
-        identify(LAW, tests, EXACT, settings=replace(QUICK, test_loss=loss, weights="noise"))
-        for loss in ("gaussian", "student")
-    )
-    weights = [m.weight for m in robust.tests]
-    assert weights[1] < 0.1
-    assert min(w for k, w in enumerate(weights) if k != 1) > 0.3
-    assert any("test_01" in note and "far from the others" in note for note in robust.notes)
-    off = {f: abs(f.values["n"] - TRUTH["n"]) for f in (plain, robust)}
-    assert off[robust] < 0.05
-    assert off[robust] < 0.2 * off[plain]
-    assert all(inside(robust).values())
-
-
 # ---- outputs, predictors -------------------------------------------------------------------------------------------
 
 

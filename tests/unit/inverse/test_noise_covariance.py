@@ -49,7 +49,6 @@ def example(seed=0, frames=5, tests=3, correlated=False):
         log_rate_sensitivity=rate,
         output_index=output,
         relative_noise=1.0 + rng.uniform(size=(tests, count)),
-        test_weights=np.linspace(0.3, 1.0, tests),
         random_effect_sensitivities=0.3 * rng.normal(size=(tests, count, 2)) * present[..., None],
         discrepancy_unit=np.where(output == 2, 0.0, np.abs(unit)),
         shared_noise=SharedNoise.of_correlations(CORRELATIONS, output, frame) if correlated else None,
@@ -111,7 +110,7 @@ def exact_covariance(residuals, sizes, test):
                 entry *= 1 + mpmath.mpf(1e-9)
                 entry += (sizes[own, "noise"] * w[i] * s[i]) ** 2 + sizes[own, "misfit"] ** 2 + mpmath.mpf(1e-10)
             c[a, b] = entry
-    return c / mpmath.mpf(float(r.test_weights[test]))
+    return c
 
 
 def exact_restricted_cost(residuals, sizes, precision, prior_residual):
@@ -288,7 +287,7 @@ def test_a_prior_is_an_observation_of_the_unknown():
         for name, v in vars(residuals).items()
         if isinstance(v, np.ndarray)
     }
-    own["present"][-1, 0], own["test_weights"][-1] = True, 1.0
+    own["present"][-1, 0] = True
     own["values"][-1, 0], own["jacobian"][-1, 0, 0], own["output_index"][-1] = -0.7, 1.0, 2
     variance = noise["rupture_time"].misfit ** 2 + 1e-10
     stated = likelihood_of(residuals, noise, (1.0 / variance, 0.0, 0.0), (-0.7, 0.0, 0.0))(noise.components)[0]

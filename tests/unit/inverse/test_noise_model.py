@@ -27,10 +27,9 @@ def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, correlation_length
 
 
 def residuals_of(values, slopes, present, times, effect, output=None):
-    """Residuals of tests that are all trusted alike."""
+    """Residuals of frames of equal noise."""
     output = np.zeros(values.shape, np.int64) if output is None else output
-    loudness, trust = np.ones(values.shape), np.ones(len(values))
-    return Residuals(values, slopes, present, np.log(times), None, effect, output, loudness, trust)
+    return Residuals(values, slopes, present, np.log(times), None, effect, output, np.ones(values.shape))
 
 
 def made(tests, frames, seed, scatter):
@@ -114,7 +113,7 @@ def test_slopes_of_the_likelihood_are_its_differences(restricted):
         linear = LinearisedProblem(residuals, np.full(3, 0.1), np.array([0.2, 0.0, -0.1]), np.ones(3, bool), bounds)
     free = [("amplitude", "noise"), ("", "discrepancy"), ("", "discrepancy_length"), ("", "rate")]
     free += [("width", name) for name in ("noise", "offset", "drift", "correlation_length")]
-    likelihood = _Likelihood(residuals.with_test_weights(np.array([1.0, 0.3])), scatter, free, linear)
+    likelihood = _Likelihood(residuals, scatter, free, linear)
     x = np.log([0.1, 1.3, 0.8, 0.6, 0.2, 0.5, 0.3, 2.0])
     slope = likelihood.cost(x)[1]
     for k in range(x.size):
@@ -130,7 +129,7 @@ def test_a_planted_discrepancy_of_two_outputs_is_found():
     output = np.tile(np.repeat([0, 1], frames), (150, 1))
     noise = np.where(output == 0, 0.02, 0.4)
     ones = np.ones_like(clock)
-    shape = Residuals(0 * ones, ones, ones > 0, clock, None, 0 * ones, output, ones, np.ones(150),
+    shape = Residuals(0 * ones, ones, ones > 0, clock, None, 0 * ones, output, ones,
                       discrepancy_unit=noise)  # fmt: skip
     parts = {"amplitude": OutputNoise(0.02), "width": OutputNoise(0.4)}
     truth = NoiseModel(parts, discrepancy=2.0, discrepancy_length=1.2)
@@ -232,7 +231,7 @@ def drawn(seed, **noise_model):
     rng, design = np.random.default_rng(seed), np.stack([CLOCK**k / 5.0**k * (1 + OUTPUT) for k in range(3)], axis=-1)
     ones = np.ones(SHAPE)
     unit = np.array(NOISE)[OUTPUT] / SCALE
-    residuals = Residuals(0 * ones, ones / SCALE, ones > 0, CLOCK, design, 0 * ones, OUTPUT, ones, np.ones(TESTS),
+    residuals = Residuals(0 * ones, ones / SCALE, ones > 0, CLOCK, design, 0 * ones, OUTPUT, ones,
                           discrepancy_unit=unit)  # fmt: skip
     drift = noise_model.pop("drift", 0.0)
     outputs = {

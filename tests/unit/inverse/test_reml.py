@@ -25,7 +25,7 @@ def linear_model(values, design, clock=None, outputs=1):
     clock = np.broadcast_to(np.linspace(0.0, 5.0, entries), (tests, entries)) if clock is None else clock
     output = np.tile(np.arange(outputs).repeat(entries // outputs), (tests, 1))
     ones = np.ones((tests, entries))
-    residuals = Residuals(values, ones, ones > 0, clock, design, 0 * ones, output, ones, np.ones(tests))
+    residuals = Residuals(values, ones, ones > 0, clock, design, 0 * ones, output, ones)
     room = np.array([[-np.inf], [np.inf]]) * np.ones(size)
     return LinearisedProblem(residuals, np.full(size, 1e-12), np.zeros(size), np.ones(size, bool), room)
 

@@ -196,7 +196,7 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + "bounds = { n = [1, 1e308] }\n", 5, "at most 1e+100"),
         (BASE + 'using = "dimpel"\n', 5, "did you mean 'dimple'"),
         (BASE + 'using = "/etc/passwd"\n', 5, "absolute"),
-        (BASE + 'test_loss = "lin"\n', 5, "must be one of these: gaussian, "),
+        (BASE + 'rupture_times = "lin"\n', 5, "must be one of these: auto, "),
         (BASE + 'nuisances = ["offst=none"]\n', 5, "did you mean 'offset'"),
         (BASE + 'nuisances = ["thicknes=0.5"]\n', 5, "thickness"),
         (BASE + 'nuisances = ["thickness=thin"]\n', 5, "write KIND"),

@@ -34,6 +34,7 @@ from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import System, Tolerances
+from creepkit.inverse.selection.discrimination import same_function
 from creepkit.inverse.selection.perturbation_trials import Challenge, decisive_effects
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
@@ -70,10 +71,6 @@ FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
 """Increase of chi-square by the reduced-order model, and by a step of the simulated law from there, from which on a sum
 is excluded without a further run.
 """
-
-
-SAME_FUNCTION = 0.05
-"""Range of ln of the ratio of two rates over all conditions, within which they are one function."""
 
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
@@ -130,7 +127,7 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
         return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    refutes = kind == "threshold" or found.fits_better
+    refutes = found.excess <= found.refuting_excess
     return Challenge(kind, found.problem.law.name, f"{found.description} {found.comparison}", refutes)
 
 
@@ -218,7 +215,16 @@ class AlteredLaw:
     @property
     def fits_better(self) -> bool:
         """Whether chi-square is lower by more than it falls by chance (95 %) with the parameters that are not held."""
-        return bool(self.excess < -chi2.ppf(0.95, max(self.further - 1, 1)))
+        return self.excess < -self._by_chance
+
+    @property
+    def refuting_excess(self) -> float:
+        """The excess up to which a verdict for the best law does not stand."""
+        return NOT_EXCLUDED if self.kind == "threshold" else -self._by_chance
+
+    @property
+    def _by_chance(self) -> float:
+        return float(chi2.ppf(0.95, max(self.further - 1, 1)))
 
     @property
     def comparison(self) -> str:
@@ -277,8 +283,7 @@ def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -
     with np.errstate(all="ignore"):
         log_rates = TermContributions.of_problem(problem).log_rates(x)
     own, further = (np.logaddexp.reduce(part, axis=1) for part in np.split(log_rates, [own_terms], axis=1))
-    difference = own - further
-    return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
+    return same_function(own, further)
 
 
 def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:

@@ -13,6 +13,9 @@ With r_a and r_b the residuals of two laws on the same frames and C the common c
 is the chi-square between their predictions: if one of them is true, the other is expected to be worse by d2. Below
 2 ln 19 = 5.9 no weight of 0.95 is to be expected even then. A law that another one becomes where a parameter takes its
 `off` value (m = 0) is equivalent too where the parameter's interval contains it.
+
+A law of more parameters whose values make it the same function as a simpler one over the tests, their rates within 5 %
+of one another, is no other answer: the simpler law, where it has more evidence, stands for both.
 """
 
 from __future__ import annotations
@@ -26,10 +29,11 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import bic_penalty
+from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem
@@ -44,6 +48,7 @@ class CommonCovarianceFits:
     and of the covariance.
     independent_frames : number of independent frames; reference_law : position of the law whose covariance it is.
     whitened : (laws, observations) - whitened residuals, zero where there are no data.
+    steps : of each law (unknowns,), from its values to its optimum.
     """
 
     chi_square: Floats
@@ -51,6 +56,7 @@ class CommonCovarianceFits:
     independent_frames: float
     reference_law: int
     whitened: Floats
+    steps: tuple[Floats, ...]
 
 
 def usual_errors(fit: Identification) -> list[Perturbation]:
@@ -81,18 +87,19 @@ def under_common_covariance(
     results = [
         _optimum_under(linear, factor, len(fit.u)) for linear, factor, fit in zip(problems, factors, fits, strict=True)
     ]
-    chi_squares, log_determinants, whitened = zip(*results, strict=True)
+    chi_squares, log_determinants, whitened, steps = zip(*results, strict=True)
     return CommonCovarianceFits(
         np.add(chi_squares, [linear.residuals.stopped.chi_square for linear in problems]),
         np.add(log_determinants, [factor.log_determinant for factor in factors]),
         effective_sample_size(reference_residuals, noise_model),
         reference_law,
         np.array(whitened),
+        steps,
     )
 
 
 def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
-    """A law's residuals, with the derivatives that make the covariance, and the weights of tests, of the best law."""
+    """A law's residuals, with the derivatives that make the covariance, of the best law."""
     offset_sensitivity, rate_effect = (
         np.where(reference.present, reference_values, own_values)
         for reference_values, own_values in (
@@ -100,12 +107,7 @@ def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
             (reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
         )
     )
-    return replace(
-        residuals,
-        offset_sensitivity=offset_sensitivity,
-        log_rate_sensitivity=rate_effect,
-        test_weights=reference.test_weights,
-    )
+    return replace(residuals, offset_sensitivity=offset_sensitivity, log_rate_sensitivity=rate_effect)
 
 
 def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem, frames: float) -> float:
@@ -115,15 +117,15 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
     """
     factor = CovarianceFactor.of_residuals(linearised.residuals, fit.noise_model)
     parameter_count = len(fit.u) + len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
-    chi_square, _, _ = _optimum_under(linearised, factor, len(fit.u))
+    chi_square, *_ = _optimum_under(linearised, factor, len(fit.u))
     chi_square -= 2.0 * linearised.residuals.stopped.log_likelihood
     return factor.log_determinant + chi_square + bic_penalty(parameter_count, frames)
 
 
 def _optimum_under(
     linearised: LinearisedProblem, factor: CovarianceFactor, parameter_count: int
-) -> tuple[float, float, Floats]:
-    """Chi-square with priors at the optimum within the bounds, log determinant of nuisances, whitened residuals.
+) -> tuple[float, float, Floats, Floats]:
+    """Chi-square with priors at the optimum within the bounds, log determinant of nuisances, whitened residuals, step.
 
     Only nuisance parameters have priors here: the weak ones of a law's parameters must not favour the middle of bounds.
     """
@@ -135,12 +137,12 @@ def _optimum_under(
     newton_step = np.clip(newton_step, *linearised.step_bounds)
     best = min(
         (
-            _chi_square(without_parameter_priors, factor, candidate_step)
+            (*_chi_square(without_parameter_priors, factor, candidate_step), candidate_step)
             for candidate_step in (newton_step, np.zeros_like(newton_step))
         ),
-        key=lambda pair: pair[0],
+        key=lambda end: end[0],
     )
-    return best[0], _nuisance_log_determinant(linearised, factor, parameter_count), best[1]
+    return best[0], _nuisance_log_determinant(linearised, factor, parameter_count), *best[1:]
 
 
 def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:
@@ -163,6 +165,52 @@ def _nuisance_log_determinant(linearised: LinearisedProblem, factor: CovarianceF
     whitened = factor.whiten(jacobian * sd)
     information = np.einsum("tep,teq->pq", whitened, whitened)
     return float(np.linalg.slogdet(information + np.eye(len(sd)))[1])
+
+
+SAME_FUNCTION = 0.05
+"""Range of ln of the ratio of two rates over all conditions, within which they are one function."""
+
+
+def same_function(first: Floats, second: Floats) -> bool:
+    """Whether two rates are multiples of one another in all tests; first, second : (points,) their logarithms."""
+    with np.errstate(invalid="ignore"):
+        difference = first - second
+    return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
+
+
+class RatesOverTests:
+    """The rates of identified laws over their tests, by which a simpler one stands for others.
+
+    A law whose rate has a history, or depends on the material's condition, is no function of the points compared.
+    """
+
+    def __init__(self, fits: Sequence[Identification]) -> None:
+        self.fits = fits
+        known = [bool(f.histories) and f.predictor is not None and not (f.law.states or f.law.conditions) for f in fits]
+        self.rates = [
+            TermContributions.of_problem(fit.least_squares_problem) if is_known else None
+            for fit, is_known in zip(fits, known, strict=True)
+        ]
+
+    def standing(self, u: Sequence[Floats], scores: Floats) -> list[int]:
+        """Of each law the position of the simpler one that stands for it, of more evidence; its own where none does.
+
+        u : (parameters,) conditioned coordinates of each. scores : (laws,) -2 ln of the evidence.
+        """
+        log_rates = [
+            np.array([np.nan]) if rates is None else rates.log_rate(own)
+            for rates, own in zip(self.rates, u, strict=True)
+        ]
+        sizes, stands = [fit.u.size for fit in self.fits], list(range(len(self.fits)))
+        for k in sorted(stands, key=lambda law: sizes[law]):
+            simpler = [j for j, size in enumerate(sizes) if size < sizes[k] and scores[j] <= scores[k]]
+            same = [j for j in simpler if same_function(log_rates[j], log_rates[k])]
+            stands[k] = stands[min(same, key=lambda law: float(scores[law]), default=k)]
+        return stands
+
+    def weights(self, standing: Sequence[int], scores: Floats) -> Floats:
+        """(laws,) weights by scores (laws,), those of laws for which another one stands with it."""
+        return np.asarray(np.bincount(standing, criterion_weights(scores)[1], len(standing)), float)
 
 
 DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
@@ -204,12 +252,6 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
             sentence = _equivalence_sentence(fits[a], fits[b], chi_square, richer_law, reduction)
             pairs.append(EquivalentLaws(fits[a].law.name, fits[b].law.name, chi_square, reduction, sentence))
     return tuple(sorted(pairs, key=lambda pair: pair.chi_square))
-
-
-def chi_square_by_test(fits: Sequence[Identification]) -> Floats:
-    """(laws, tests) - chi-square of laws in each test at their optima under one covariance, without priors."""
-    whitened = under_common_covariance(fits).whitened
-    return np.asarray((whitened.reshape(len(fits), len(fits[0].tests), -1) ** 2).sum(axis=2))
 
 
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:

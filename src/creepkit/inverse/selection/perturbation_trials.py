@@ -20,12 +20,18 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, under_common_covariance, usual_errors
+from creepkit.inverse.selection.discrimination import (
+    DISTINGUISHABLE_CHI_SQUARE,
+    CommonCovarianceFits,
+    RatesOverTests,
+    under_common_covariance,
+    usual_errors,
+)
 from creepkit.records import Nuisance, is_length_nuisance
 
 MOST_NAMED = 2
@@ -58,40 +64,52 @@ Scope = Literal["test", "all"]
 class Trial:
     """The laws with one perturbation. scope : whether it is independent in each test, or one of all tests.
 
-    effects : it, by each law. scores, weights : (laws,) -2 ln of the evidence by BIC, and the weights by it.
-    noise_model : of the common covariance.
+    effects : it, by each law. scores : (laws,) -2 ln of the evidence by BIC. u : of each law (parameters,) coordinates
+    where it fits best. noise_model : of the common covariance.
     """
 
     scope: Scope
     effects: tuple[Perturbation, ...]
     scores: Floats
-    weights: Floats
+    u: tuple[Floats, ...]
     noise_model: NoiseModel
 
     @classmethod
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
-        scores, noise_model = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
-        return cls(scope, effects, scores, criterion_weights(scores)[1], noise_model)
+        scores, common = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
+        u = tuple(fit.u + step[: fit.u.size] for fit, step in zip(fits, common.steps, strict=True))
+        return cls(scope, effects, scores, u, fits[common.reference_law].noise_model)
 
     @property
     def is_of_length(self) -> bool:
         """Whether it is the error of a length of the test pieces."""
         return is_length_nuisance(self.effects[0].kind) and not self.effects[0].kind.startswith(OFFSET)
 
-    def sizes(self, fits: Sequence[Identification], law: int) -> Floats:
-        """(1,) of all tests or (tests,) sizes of the perturbation by a law, in standard deviations."""
-        return sizes_of_effect(
-            fits[law].linear_problem, self.effects[law], self.noise_model, common=self.scope == "all"
-        )
-
     def description(self, fits: Sequence[Identification], law: int) -> str:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
-        return _description(self, fits[law], law, self.sizes(fits, law))
+        fit, common = fits[law], self.scope == "all"
+        sizes = sizes_of_effect(fit.linear_problem, self.effects[law], self.noise_model, common=common)
+        effect, tests, differ = self.effects[law], len(fit.tests), sizes.size > 1
+        size = float(np.abs(sizes).max()) if differ else float(sizes[0])
+        where = "the test" if tests == 1 else f"each of the {tests} tests"
+        if self.is_of_length:
+            predictor = fit.least_squares_problem.predictor
+            nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
+            share = f"{abs(100 * size * effect.size / nominal):.2g} %"
+            if differ:
+                return f"independent errors of up to {share} in the {effect.kind} of {where}"
+            return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
+        amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
+        amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
+        if effect.kind == DRIFT:
+            return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
+        output = effect.kind.removeprefix(OFFSET).replace("_", " ")
+        return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
 
 
-def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, NoiseModel]:
-    """(laws,) -2 ln of the evidence by BIC of identifications, and the noise model it is under.
+def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, CommonCovarianceFits]:
+    """(laws,) -2 ln of the evidence by BIC of identifications, and the fits under one covariance that it is of.
 
     tried : a perturbation by each law, beside the usual errors of tests, and in the place of one of its kind.
     """
@@ -100,27 +118,7 @@ def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) 
         errors = [[*(e for e in own if e.kind != new.kind), new] for own, new in zip(errors, tried, strict=True)]
     common = under_common_covariance(fits, errors)
     penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
-    return common.chi_square + common.log_determinant + penalties, fits[common.reference_law].noise_model
-
-
-def _description(trial: Trial, fit: Identification, law: int, sizes: Floats) -> str:
-    """What it takes, to follow "with"; sizes : (1,) of all tests, or (tests,), in standard deviations."""
-    effect, tests, differ = trial.effects[law], len(fit.tests), sizes.size > 1
-    size = float(np.abs(sizes).max()) if differ else float(sizes[0])
-    where = "the test" if tests == 1 else f"each of the {tests} tests"
-    if trial.is_of_length:
-        predictor = fit.least_squares_problem.predictor
-        nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
-        share = f"{abs(100 * size * effect.size / nominal):.2g} %"
-        if differ:
-            return f"independent errors of up to {share} in the {effect.kind} of {where}"
-        return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
-    amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
-    amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
-    if effect.kind == DRIFT:
-        return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
-    output = effect.kind.removeprefix(OFFSET).replace("_", " ")
-    return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
+    return common.chi_square + common.log_determinant + penalties, common
 
 
 def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
@@ -141,12 +139,14 @@ def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
 def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The perturbations, one by one, with which the first law no longer has nearly all the weight."""
     challenges: dict[str, tuple[float, Challenge]] = {}
+    rates = RatesOverTests(fits)
     for trial in _trials(fits):
-        effect, weight = trial.effects[0], float(trial.weights[0])
+        weights = rates.weights(rates.standing(trial.u, trial.scores), trial.scores)
+        effect, weight = trial.effects[0], float(weights[0])
         if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
             continue
-        rival = 1 + int(np.argmax(trial.weights[1:]))
-        name, weight_of_rival = fits[rival].law.name, f"{trial.weights[rival]:.2f}"
+        rival = 1 + int(np.argmax(weights[1:]))
+        name, weight_of_rival = fits[rival].law.name, f"{weights[rival]:.2f}"
         sentence = (
             f"with {trial.description(fits, rival)} {name} would explain them (weight {weight_of_rival})"
             if _explains_with(fits[rival], trial.effects[rival])

@@ -1,6 +1,7 @@
 """Ranking of identified laws with weights: a set of laws, and a verdict no stronger than the evidence.
 
-Weights are of the laws tried. An answer is decisive where one of them has more than 95 % of the weight, explains the
+Weights are of the laws tried; a simpler law has those too of laws that are the same function as it over the tests (see
+selection.discrimination). An answer is decisive where one of them has more than 95 % of the weight, explains the
 tests to their noise (see inverse.adequacy), was among the laws asked for, and stands every challenge: no sum with a
 share of another law explains the tests better, no threshold as well, and no unmodelled effect would change the answer
 (see selection.challenges). What share of another law the tests allow is said beside it.
@@ -12,7 +13,7 @@ frames and nuisance parameters and usual errors of tests integrated out. Weights
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -32,7 +33,7 @@ from creepkit.inverse.information_criteria import (
     criterion_weights,
     determined_parameters,
 )
-from creepkit.inverse.selection.discrimination import under_common_covariance, usual_errors
+from creepkit.inverse.selection.discrimination import RatesOverTests, under_common_covariance, usual_errors
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
@@ -48,12 +49,16 @@ Criterion = Literal["bic", "aicc"]
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, weight, and chi-square under the covariance of the best."""
+    """One law in a ranking: criterion less the best, weight, and chi-square under the covariance of the best.
+
+    same_as : name of the simpler law that is the same function over the tests, which has its weight; "" of most.
+    """
 
     fit: Identification
     excess: float
     weight: float
     chi_square: float = float("nan")
+    same_as: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,10 +146,21 @@ class Ranking(Presentable, Plotted, Tabulated):
         unmet, best = self.unmet, self.best.law.name
         if "alternatives" in unmet:
             return f"{unmet['alternatives']}; {self.adequacy_text}"
+        same = f"; {self.same_functions}" if self.same_functions else ""
         if not unmet:
             allowed = "".join(f"; but {challenge}" for challenge in self.challenges or ())
-            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}{allowed}"
-        return f"not decisive: {_reason(self, unmet)}"
+            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}{same}{allowed}"
+        return f"not decisive: {_reason(self, unmet)}{same}"
+
+    @property
+    def same_functions(self) -> str:
+        """Which laws the best one stands for, in a clause; "" where none."""
+        names = [ranked.fit.law.name for ranked in self.laws if ranked.same_as == self.best.law.name]
+        has, function = (
+            "with its values is" if len(names) == 1 else "with their values are",
+            "the same function over the tests",
+        )
+        return f"{' and '.join(names)} {has} {function}" if names else ""
 
     @property
     def model_average(self) -> ModelAverage:
@@ -184,16 +200,12 @@ class Ranking(Presentable, Plotted, Tabulated):
 
     drawn_by = "ranking.ranking_figure", "ranking.draw_misfits"
 
+    detailed_by = "ranking.ranking_text"
+
     def __str__(self) -> str:
         from creepkit.reports.answer import answer_text
 
         return answer_text(self.best, self)
-
-    def details(self) -> str:
-        """Everything that there is to say, as text."""
-        from creepkit.reports.ranking import ranking_text
-
-        return ranking_text(self)
 
 
 def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
@@ -234,10 +246,13 @@ def rank(
     criterion: Criterion = "bic",
     failed: Mapping[str, str] | None = None,
     *,
+    further: Collection[str] = (),
     challenge: bool = True,
 ) -> Ranking:
     """Rank identifications made from the same histories, with weights and a verdict; criterion : "bic" or "aicc".
 
+    further : names of laws that nobody asked for. One that the tests contradict, too, comes last where it predicts
+        tests worse, each left out, than a law that was asked for: it only bends further to the curves at hand.
     challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
         is decisive.
     """
@@ -253,10 +268,21 @@ def rank(
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
     score = chi_square + common.log_determinant + [penalty(count, independent_frames) for count in counts]
+    score = np.where(_are_outdone(fits, further), np.inf, score)
     ranking = ranking_from_scores(
-        fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
-    )
+        fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed,
+        rates=RatesOverTests(fits),
+    )  # fmt: skip
     return challenged(ranking) if challenge else ranking
+
+
+def _are_outdone(fits: Sequence[Identification], further: Collection[str]) -> list[bool]:
+    """(laws,) Whether it was not asked for, is contradicted, and one that was asked for predicts tests better."""
+    least = min((fit.prediction_error for fit in fits if fit.law.name not in further), default=np.nan)
+    return [
+        fit.law.name in further and fit.adequacy is not None and fit.adequacy.rejects and fit.prediction_error > least
+        for fit in fits
+    ]
 
 
 def challenged(ranking: Ranking) -> Ranking:
@@ -270,7 +296,7 @@ def challenged(ranking: Ranking) -> Ranking:
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    weights = np.array([ranked.weight for ranked in ranking.laws])
+    _, weights = criterion_weights([ranked.excess for ranked in ranking.laws])
     found = challenges_of(fits) if ranking.singled_out else explaining_effects(fits, weights)
     return replace(ranking, challenges=found)
 
@@ -283,15 +309,20 @@ def ranking_from_scores(
     independent_frames: float,
     chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
+    rates: RatesOverTests | None = None,
 ) -> Ranking:
-    """The ranking of identifications.
+    """The ranking of identifications; rates : theirs, by which a simpler law may stand for others.
 
     scores : (laws,) -2 ln of their evidence. chi_square : (laws,) of their residuals. Laws whose score is no number, or
     that do not predict every test, come after the others and have no weight beside them.
     """
     predicted = np.isfinite(scores) & [fit.adequacy is None or not fit.adequacy.unpredicted for fit in fits]
-    excess, weight = criterion_weights(np.where(predicted, scores, np.inf) if predicted.any() else scores)
+    scores = np.where(predicted, scores, np.inf) if predicted.any() else scores
+    excess, weight = criterion_weights(scores)
+    standing = [*range(len(fits))] if rates is None else rates.standing([fit.u for fit in fits], scores)
+    weight = weight if rates is None else rates.weights(standing, scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
-    laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
+    names = [fits[law].law.name if law != k else "" for k, law in enumerate(standing)]
+    laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k]), names[k]) for k in order)
     return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))

@@ -321,6 +321,11 @@ class TermContributions:
             log_rates[:, k] = kernel.internal_log_rate(*self.point, *states, *columns)
         return log_rates
 
+    def log_rate(self, u: Floats) -> Floats:
+        """(points,) ln of the rate of all terms."""
+        with np.errstate(all="ignore"):
+            return np.asarray(np.logaddexp.reduce(self.log_rates(u), axis=1))
+
     def values(self, u: Floats) -> Floats:
         """(terms,) c."""
         shares = softmax(np.maximum(np.nan_to_num(self.log_rates(u), nan=LOG_ZERO_RATE), LOG_ZERO_RATE), axis=1)
@@ -346,6 +351,7 @@ def contribution_norm(contributions: TermContributions) -> System:
 def _points_of_test(history: History, predictor: Predictor | None) -> Floats:
     """(4, points) stress, strain, time, temperature of one test, without those where it bears no load."""
     frames = selected_frames(history, TIMES_PER_TEST)
+    frames = frames if frames.size else np.array([history.times.size - 1])  # of a minimum rate or a life alone
     time = history.times[frames]
     strain, temperature = _strain_history(history, predictor)[frames], history.temperature_program().at(time)
     stresses = np.multiply.outer(_stress_history(history, predictor, time), STRESS_FACTORS)

@@ -15,6 +15,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.quantities import (
@@ -34,7 +35,7 @@ class WeightedLaws(Protocol):
 
     @property
     def laws(self) -> Sequence[Any]:
-        """Its laws, each with `fit`, its identification, and `weight`."""
+        """Its laws, each with `fit`, its identification, and `excess` of the criterion."""
         ...
 
 
@@ -55,11 +56,15 @@ class ModelAverage(RateStatements, Presentable):
 
     @classmethod
     def from_ranking(cls, source: WeightedLaws | Identification) -> ModelAverage:
-        """The laws of a ranking; a single identification is a mixture of one."""
+        """The laws of a ranking; a single identification is a mixture of one.
+
+        Each has its own weight: laws that are one function over the tests may differ beyond them.
+        """
         if isinstance(source, Identification):
             return cls((source,), (1.0,))
-        weighted = [r for r in source.laws if r.weight > 0]
-        return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
+        weights = criterion_weights([r.excess for r in source.laws])[1]
+        weighted = [(r.fit, float(weight)) for r, weight in zip(source.laws, weights, strict=True) if weight > 0]
+        return cls(*zip(*weighted, strict=True))
 
     @property
     def ranges(self) -> Mapping[str, tuple[float, float]]:  # type: ignore[override]

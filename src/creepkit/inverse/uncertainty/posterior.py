@@ -132,9 +132,8 @@ class Posterior:
     """ln p, but for a constant, of candidates u.
 
     problem : with nuisance parameters fixed at their estimates. rate_sd : standard deviation of ln rate between tests.
-    test_weights : (tests,) -. covariance_factor : without the scatter of rates. rate_effect : (tests, observations) -,
-    at the optimum, what one standard deviation of a test's own rate does. parameter_bounds : (2, parameters) of the
-    internal parameters.
+    covariance_factor : without the scatter of rates. rate_effect : (tests, observations) -, at the optimum, what one
+    standard deviation of a test's own rate does. parameter_bounds : (2, parameters) of the internal parameters.
     nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
     degrees_of_freedom : nu. optimum : (parameters,) u, of least_chi_square. errors : (tests, observations) -, what the
     errors of the tests did to the residuals. quadratic : residuals as functions of u, in the place of predictions.
@@ -142,7 +141,6 @@ class Posterior:
 
     problem: LeastSquaresProblem
     rate_sd: float
-    test_weights: Floats
     covariance_factor: CovarianceFactor
     rate_effect: Floats
     parameter_bounds: Floats
@@ -162,7 +160,7 @@ class Posterior:
         assert residuals.jacobian is not None
         e = fit.x[count:]
         factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
-        rate_effect = residuals.log_rate_sensitivity * noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
+        rate_effect = residuals.log_rate_sensitivity * noise_model.rate
         root_precision = np.diag(np.sqrt(nuisances.precision))
         nuisance_jacobian = _whitened(factor, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
         nuisance_rows = nuisance_jacobian[:, problem.observations.present].T
@@ -170,7 +168,6 @@ class Posterior:
         found = cls(
             problem=problem.with_fixed_nuisances(e),
             rate_sd=noise_model.rate,
-            test_weights=residuals.test_weights,
             covariance_factor=factor,
             rate_effect=rate_effect,
             parameter_bounds=fit.law.internal_bounds,
@@ -241,9 +238,8 @@ class Posterior:
         residuals, jacobian = (self.quadratic or self.problem).candidate_jacobian(u)
         effect = self.rate_effect
         if self._rates_are_coefficients:
-            rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
             of_rates = jacobian[..., list(self.problem.coordinates.coefficients)].sum(axis=-1)
-            effect = 0.5 * (self.rate_effect + of_rates * rate_scatter)
+            effect = 0.5 * (self.rate_effect + of_rates * self.rate_sd)
         return residuals - self.errors, effect, jacobian
 
     @property

@@ -110,7 +110,7 @@ class RateScatter:
 
     tests : their names. members : {level: (tests,) names} of the levels that these tests tell apart, without "test".
     common : {level: name} of the levels whose one member they all belong to.
-    log_factor, variance, weight : (tests,) z, var e, and the weight of the test. design : (tests, unknowns) X.
+    log_factor, variance : (tests,) z and var e. design : (tests, unknowns) X.
     precision, gradient : (unknowns, unknowns) K and (unknowns,) g.
     known : the standard deviation between tests where it was given, None where it is estimated; 0 for none.
     stresses, temperatures : (tests,) MPa and K. errors : (unknowns, unknowns) covariance of x by errors common to all
@@ -124,7 +124,6 @@ class RateScatter:
     members: Mapping[str, tuple[str, ...]]
     log_factor: Floats
     variance: Floats
-    weight: Floats
     design: Floats
     precision: Floats
     gradient: Floats
@@ -191,8 +190,8 @@ class RateScatter:
         sd : (..., levels). columns : (tests, effects) on ln rates. prior_sd : (effects,) their prior standard
         deviations. Returns (...,), (..., n) and (..., n, n).
         """
-        own = (np.maximum(sd[..., -1:], SMALLEST_EFFECT) ** 2 + self.variance) / self.weight
-        further = np.zeros((self.weight.size, 0)) if columns is None else columns
+        own = np.maximum(sd[..., -1:], SMALLEST_EFFECT) ** 2 + self.variance
+        further = np.zeros((self.variance.size, 0)) if columns is None else columns
         Q, size = np.concatenate([self.joint_design, further], axis=1), self.design.shape[1]
         of_group = sd[..., [self.levels.index(level) for level, _ in self.groups]]
         of_further = np.zeros(0) if prior_sd is None else np.asarray(prior_sd, float)
@@ -376,7 +375,6 @@ def rate_scatter(
     return RateScatter(
         tests=tuple(h.name for h in problem.histories),
         members=_members(problem.histories),
-        weight=np.array(residuals.test_weights, float),
         common=_common_members(problem.histories),
         known=_known_sd(problem.settings.nuisances),
         stresses=problem.conditions[0],
@@ -404,22 +402,20 @@ def _evidence(
     prior : precision and gradient, (unknowns,) each.
     """
     assert residuals.jacobian is not None
-    weight = residuals.test_weights
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
     jacobian = residuals.jacobian.copy()
     jacobian[..., list(integrated)] = 0.0
-    factor = CovarianceFactor.of_residuals(unweighted, noise_model)
-    effects = np.stack([unweighted.values, *test_effects], axis=-1)
-    weighted_rate = factor.inverse_times(unweighted.log_rate_sensitivity)
-    information = np.maximum(np.einsum("te,te->t", weighted_rate, unweighted.log_rate_sensitivity), 1e-12)
+    factor = CovarianceFactor.of_residuals(residuals, noise_model)
+    effects = np.stack([residuals.values, *test_effects], axis=-1)
+    weighted_rate = factor.inverse_times(residuals.log_rate_sensitivity)
+    information = np.maximum(np.einsum("te,te->t", weighted_rate, residuals.log_rate_sensitivity), 1e-12)
     joined = np.concatenate([effects, jacobian], axis=-1)
     projected = np.einsum("te,tep->tp", weighted_rate, joined) / information[:, None]
     design, log_factor = projected[:, effects.shape[-1] :], -projected[:, 0]
-    weighted = factor.inverse_times(jacobian) * weight[:, None, None]
+    weighted = factor.inverse_times(jacobian)
     precision = np.einsum("tep,teq->pq", weighted, jacobian) + np.diag(prior[0])
-    precision -= np.einsum("tp,t,tq->pq", design, weight * information, design)
-    gradient = np.einsum("tep,te->p", weighted, unweighted.values) + prior[1]
-    gradient += design.T @ (weight * information * log_factor)
+    precision -= np.einsum("tp,t,tq->pq", design, information, design)
+    gradient = np.einsum("tep,te->p", weighted, residuals.values) + prior[1]
+    gradient += design.T @ (information * log_factor)
     return {
         "log_factor": log_factor,
         "variance": 1.0 / information + (projected[:, 1 : effects.shape[-1]] ** 2).sum(axis=1),

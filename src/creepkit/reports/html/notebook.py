@@ -11,15 +11,15 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.records import Histories, History, Specimen
-from creepkit.reports.answer import equations, symbols_of, unit_text
-from creepkit.reports.blocks import Block, Formula, Paragraph, Table, Verbatim, number, plural
+from creepkit.reports.answer import equations
+from creepkit.reports.blocks import Block, Formula, Paragraph, Verbatim, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks, tests_figure
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
 from creepkit.reports.html.templates import template
-from creepkit.reports.law_names import LawNames
+from creepkit.reports.law_names import LawNames, symbols_table
 from creepkit.reports.ranking import ranking_blocks
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
@@ -69,12 +69,7 @@ def _(result: Identification | Ranking) -> Sequence[Block]:
 
 @_blocks.register
 def _(law: CreepLaw) -> Sequence[Block]:
-    symbols = symbols_of(law)
-    rows = [
-        (symbols[name], one.meaning, f"{number(one.bounds[0])} to {number(one.bounds[1])}", unit_text(one.unit))
-        for name, one in law.table.items()
-    ]
-    table = Table("stress as a ratio to 1 MPa, time to 1 s", ("parameter", "meaning", "bounds", "unit"), rows)
+    table = symbols_table("stress as a ratio to 1 MPa, time to 1 s", law)
     return [Paragraph(law.title or law.name, "lead"), *map(Formula, equations(law)), table]
 
 

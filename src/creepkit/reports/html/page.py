@@ -20,7 +20,6 @@ from creepkit.reports.answer import (
     interval_text,
     rate_exponent_and_energy,
     rupture_figures,
-    tests_text,
     titled_law,
 )
 from creepkit.reports.attachments import embed
@@ -41,6 +40,7 @@ from creepkit.reports.blocks import (
     sentence,
     typeset,
 )
+from creepkit.reports.description import tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
 from creepkit.reports.forecast import forecast_blocks
@@ -151,6 +151,7 @@ def block_shown(block: Block, names: LawNames) -> Block:
         return dataclasses.replace(
             block,
             headline=said(block.headline),
+            tests=typeset(block.tests),
             picture=None if block.picture is None else block_shown(block.picture, names),
             values=[
                 cells((name, f"{value}{' (at the bound of its search)' * (f'{value} (search bound)' in ends)}", unit))
@@ -210,7 +211,7 @@ def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[Ke
         rupture = ", and times to rupture, predicted over measured" if rupture_rows(fit) else ""
         title = f"The law over the tests{found.of}"
         description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
-        picture = figures.picture(lambda: summary_figures(fit), title, description, f"{title}: {tests_text(fit)}.")
+        picture = figures.picture(lambda: summary_figures(fit), title, description, f"{title}.")
     return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 

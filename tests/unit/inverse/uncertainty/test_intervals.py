@@ -175,9 +175,9 @@ def test_two_laws_that_disagree_widen_the_interval(fit_of):
 
 def test_a_ranking_is_a_mixture_of_its_laws(fit_of):
     other = replace(fit_of, u=fit_of.u + np.array([0.0, 3.0]))
-    weighed = [SimpleNamespace(fit=fit_of, weight=0.75), SimpleNamespace(fit=other, weight=0.25)]
-    ranking = SimpleNamespace(laws=[*weighed, SimpleNamespace(fit=None, weight=0.0)])
+    weighed = [SimpleNamespace(fit=fit_of, excess=0.0), SimpleNamespace(fit=other, excess=2.0 * np.log(3.0))]
+    ranking = SimpleNamespace(laws=[*weighed, SimpleNamespace(fit=None, excess=np.inf)])
     found = ModelAverage.from_ranking(ranking)
-    assert found.weights == (0.75, 0.25)
+    assert found.weights == pytest.approx((0.75, 0.25))
     sd = float(np.sqrt(fit_of.covariance[1, 1]))
     assert float(found.local_exponent(60.0)[1]) == pytest.approx(fit_of.u[1] + sd * norm.ppf(0.025 / 0.75), abs=1e-4)
