@@ -130,6 +130,15 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         values = ", ".join(f"{name} = {value:.4g}" for name, value in self.values.items())
         return f"<Identification of {self.law.name} from {len(self.tests)} tests: {values}>"
 
+    @property
+    def prediction_error(self) -> float:
+        """Of ln strain: root of the mean squares of what the law leaves, and of rates of tests by the others alone.
+
+        NaN of fewer than four tests, or without strains.
+        """
+        rates = [one.log_factor for one in self.left_out]
+        return float(np.hypot(self.rms, np.sqrt(np.mean(np.square(rates))))) if rates else np.nan
+
     def to_arviz(self, *, draws: int = 1000, seed: int = 0) -> Any:
         """Draws from the posterior as an xarray Dataset, which arviz takes: one chain, with units of the parameters."""
         return self.sample(draws=draws, seed=seed).to_arviz()
@@ -471,9 +480,4 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     drawn_by = "identification_plot.identification_figure", "identification_plot.draw_identification"
 
     shown_by = "answer.answer_text"
-
-    def details(self) -> str:
-        """Everything that there is to say, as text."""
-        from creepkit.reports.identification import identification_text
-
-        return identification_text(self)
+    detailed_by = "identification.identification_text"

@@ -39,13 +39,23 @@ LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 
 
+PAUSE = 0.1
+"""Of the largest stress of a test under a load: below it, as in a pause or a loading ramp, hardly anything creeps."""
+
+
 def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames, MPa, K, s; and of conditions.
 
     values : of the law, by which stresses are simulated where they change while specimens creep.
     """
     tests = problem.histories
-    stresses = [v for h in tests for v in simulated_stresses(problem.law, values, h, problem.predictor)]
+    simulated = [(h, simulated_stresses(problem.law, values, h, problem.predictor)) for h in tests]
+    stresses = [
+        float(v)
+        for h, of_test in simulated
+        for v in of_test
+        if h.loading.quantity == "strain" or v >= PAUSE * of_test.max()
+    ]
     values_by_name = {
         "stress": stresses or [0.0],
         "temperature": [v for h in tests for v in h.followed_temperatures],

@@ -367,10 +367,13 @@ GAROFALO = "Garofalo (1965), Fundamentals of Creep and Creep-Rupture in Metals, 
 
 def with_primary(law: Law) -> Law:
     """Multiply the rates of all terms by 1 + b exp(-strain / e_p); see CreepLaw.with_primary."""
-    if law.states or any(term.has(strain, time) for term in law.terms.values()):
+    for symbol, param in law.params.items():
+        if law.states and param.off is not None and any(one.has(time**symbol) for one in law.terms.values()):
+            law = _substituted(law, {symbol: sympy.Float(param.off)}, law.name, law.title)  # hardens by strain then
+    if any(term.has(strain, time) for term in law.terms.values()):
         raise LawError(
-            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress and "
-            "temperature alone, such as law('hyperbolic-sine')"
+            f"law '{law.name}' has primary or tertiary creep of its own: with_primary() takes a law of stress, "
+            "temperature and damage alone, such as law('hyperbolic-sine')"
         )
     params = {
         Symbol("b"): Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
@@ -388,8 +391,12 @@ def multiplied(
     reference: str,
     *,
     name: str | None = None,
+    states: Mapping[sympy.Symbol, State] | None = None,
 ) -> Law:
-    """Multiply the rates of all terms by a factor; where a name of its parameters is taken, that one is numbered."""
+    """Multiply the rates of all terms by a factor, of further states if it has some.
+
+    Where a name of its parameters is taken, that one is numbered.
+    """
     taken = set(law.names)
     names = {symbol: Symbol(unused_name(symbol.name, taken)) for symbol in params}
     return replace(
@@ -397,6 +404,7 @@ def multiplied(
         name=f"{law.name}*{name or title.replace(' ', '-')}",
         title=f"{law.title or law.name} {'and' if ' with ' in law.title else 'with'} {title}",
         terms={label: term * factor.xreplace(names) for label, term in law.terms.items()},
+        states={**law.states, **{z: replace(one, rate=one.rate.xreplace(names)) for z, one in (states or {}).items()}},
         params={**law.params, **{names[symbol]: param for symbol, param in params.items()}},
         references=tuple(dict.fromkeys((*law.references, reference))),
         examples=(),

@@ -73,8 +73,8 @@ class CreepLaw(LawRecord):
     def with_primary(self) -> CreepLaw:
         """The law with primary creep: every rate times 1 + b exp(-strain / e_p), which falls to the rate it had.
 
-        For laws of stress and temperature alone; b is the initial over the steady rate, less one, and e_p the strain
-        over which it fades.
+        For laws of stress, temperature and damage alone, whose hardening with time, if any, is switched off; damage
+        grows as it did. b is the initial over the steady rate, less one, and e_p the strain over which it fades.
         """
         return algebra.with_primary(self)
 

@@ -21,6 +21,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.limits import SIGNIFICANCE
 from creepkit.quality.frames import block_means, load_segments
 from creepkit.records import History, growing_output
+from creepkit.records.reading_noise import noise_of_readings
 
 LEAST_RISE = 1.5
 """Rate at the end over the smallest, of the fitted curve, from which on it is called tertiary creep."""
@@ -30,8 +31,12 @@ PARTS = ((0.0, 1.0), (0.25, 1.0), (0.5, 1.0), (0.7, 1.0), (0.0, 0.6), (0.2, 0.8)
 """Parts of a curve in which its rate is judged, over its duration: a rate that rises may fall again later."""
 
 
-PARTS_OF_STRAIN = ((0.0, 1.0), (0.0, 0.5), (0.0, 0.3))
+PARTS_OF_STRAIN = tuple((0.0, end) for end in (1.0, 0.5, 0.3, 0.15, 0.08, 0.04))
 """Parts in which a rate may fall, over the growth of the output: primary creep comes first, and is short in time."""
+
+
+CLEAR = 20.0
+"""Standard deviations of a reading that the output grows in a part at least, where time is judged over the output."""
 
 
 STEEP, LAST_FRAMES = 2.0, 5
@@ -81,8 +86,11 @@ def shows_primary_creep(history: History) -> bool:
     if not segments or not segments[0].is_first:
         return False
     times, values = _curve(history, segments[0].frames)
-    grows = np.ptp(times) > 0 and values[-1] > values[0]
-    return bool(grows and (_rises_in_a_part(values, times, PARTS_OF_STRAIN) or _falls_at_first(times, values)))
+    if not np.ptp(times) > 0 or not values[-1] > values[0]:
+        return False
+    least = CLEAR * noise_of_readings(values) / float(np.ptp(values))
+    parts = [part for part in PARTS_OF_STRAIN if part[1] > least or part in PARTS_OF_STRAIN[:3]]
+    return _rises_in_a_part(values, times, parts) or _falls_at_first(times, values)
 
 
 def falls_logarithmically(history: History) -> bool:

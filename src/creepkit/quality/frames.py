@@ -56,6 +56,10 @@ OPPOSITE_NEIGHBOUR_FRACTION = 0.3
 """Fraction of a frame's residual that its neighbours must have with the other sign if it is to be a single outlier."""
 
 
+STEP_FRACTION = 0.4
+"""Fraction of a frame's residual that one beside it has without it where the curve steps there: then nearly all."""
+
+
 TIES = 0.1
 """Fraction of readings that are the same as those before, above which the readings are rounded."""
 
@@ -222,8 +226,14 @@ def outlier_frames(history: History) -> Iterator[QualityFlag]:
             standardised = np.where(
                 _isolated(residuals), np.abs(residuals) / np.maximum(_local_scale(residuals), sigma), 0.0
             )
+            standardised[standardised <= OUTLIER_THRESHOLD * (1 + FEW_FRAMES_CORRECTION / frames.size)] = 0.0
+            for worst in np.flatnonzero(standardised):
+                kept = np.delete(frames, worst + 2)
+                left = _interpolation_residuals(history.times[kept], values[kept])[0][max(worst - 2, 0) : worst + 2]
+                if np.abs(left).max() > STEP_FRACTION * abs(residuals[worst]):
+                    standardised[worst] = 0.0  # its neighbour is off without it, too
             worst = int(np.argmax(standardised))
-            if not standardised[worst] > OUTLIER_THRESHOLD * (1 + FEW_FRAMES_CORRECTION / frames.size):
+            if not standardised[worst]:
                 break
             deviation_text = _difference_text(history, float(residuals[worst] * residual_scale[worst]))
             frame = int(frames[worst + 2])

@@ -27,9 +27,10 @@ WIDTHS = (*range(1, 40), *(int(40 * 1.2**k) for k in range(20)))
 """Intervals that an idle part may have."""
 
 
-LARGEST_GROWTH, THRESHOLD, RATE_THRESHOLD, RATE_RATIO = 0.25, 8.0, 5.0, 4.0
+LARGEST_GROWTH, THRESHOLD, RATE_THRESHOLD, RATE_RATIO, FALL_THRESHOLD = 0.25, 8.0, 5.0, 4.0, 8.0
 """Of the growth that the rates lead to; standard deviations by which it falls short, and of the rates themselves; ratio
-of the rates before and after, above which the curve bends too sharply to say anything."""
+of the rates before and after, above which the curve bends too sharply to say anything; standard deviations of a fall
+from one frame to the next, which no idle time explains."""
 
 
 class IdlePart(NamedTuple):
@@ -79,6 +80,8 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
     sigma = max(noise_of_readings(values), rounding_step(values))
     found: list[tuple[float, IdlePart]] = []
     rates_over = cache(partial(_rates, times, values, sigma))
+    noise = max(noise_of_readings(values, times, order=3), rounding_step(values))
+    falls = np.append(0, np.cumsum(np.diff(values) < -FALL_THRESHOLD * noise))
     for width in WIDTHS:
         beside = max(FRAMES_BESIDE, width // 2)
         first = np.arange(beside, times.size - beside - width)
@@ -94,7 +97,7 @@ def idle_parts(times: Floats, values: Floats) -> list[IdlePart]:
         is_idle &= (least > RATE_THRESHOLD * error) & (np.maximum(rates[before], rates[after]) < RATE_RATIO * least)
         is_idle &= lacking > THRESHOLD * np.hypot(1.5 * sigma, span * error)
         shorter = np.minimum(times[first] - times[before], times[after + beside] - times[after])
-        is_idle &= shorter > SHORTEST_BESIDE * span
+        is_idle &= (shorter > SHORTEST_BESIDE * span) & (falls[first + width] == falls[first])
         for k in np.flatnonzero(is_idle):
             rate = float(np.sqrt(rates[before[k]] * rates[after[k]]))
             idle = float(span[k] - max(growth[k], 0.0) / rate)

@@ -293,10 +293,11 @@ def _time_and_end(
     if said == {STOPPED}:
         conditions.record_assumption(f"stopped before rupture by its label '{quoted(label)}'")
         return time, STOPPED, True
-    if time is None and frames is not None:
-        broke = [label for label, end in (firm | remarks).items() if end == RUPTURED]
+    broke = [label for label, end in (firm | remarks).items() if end == RUPTURED]
+    if time is None and frames is not None and broke:
         time = _time_in_remark(conditions, broke, frames)
-        said = {RUPTURED} if time is not None else said
+        names_another = time is None and any(_HOURS.search(conditions.labels[label]) for label in broke)
+        said = said if names_another else {RUPTURED}
     return time, "".join(said), False
 
 

@@ -255,7 +255,7 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
     while body > 1 and only_text(rows[body - 1], dialect):  # sections above the first test
         body -= 1
     first = body
-    while first > max(0, body - _DEEPEST) and _may_name(rows[first - 1], dialect):
+    while first > max(0, body - _DEEPEST) and _may_name(rows[first - 1], dialect) and _is_of_one_head(rows, first):
         first -= 1
     for start in range(body - 1, first - 1, -1):
         names = _joined([row.cells for row in rows[start:body]], meant)
@@ -270,6 +270,13 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
                 return TestTableHead(tuple(wider), higher, start, body)
         return TestTableHead(tuple(names), start, start, body)
     return None
+
+
+def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:
+    """Whether the row above another one belongs to its head: no empty line parts them, and it is no remark."""
+    above = [cell for cell in rows[below - 1].cells if cell]
+    is_remark = len(above) == 2 < sum(map(bool, rows[below].cells)) and kind_of_column(above[0]) == "remark"
+    return rows[below].line - rows[below - 1].line == 1 and not is_remark
 
 
 def _may_name(row: TableRow, dialect: Dialect) -> bool:

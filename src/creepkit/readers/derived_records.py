@@ -42,7 +42,7 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import UNUSED, TableFrames, column_question
-from creepkit.readers.imposed import hold_begins
+from creepkit.readers.imposed import hold_begins, under_load
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records.loading import Program
@@ -192,11 +192,12 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
     stated = conditions.take_number("force")
     area, how = _area(conditions)
     nominal = conditions.number_of("stress")
-    held = hold_begins(frames.times, column) if column is not None else None
+    on = None if column is None else under_load(column)
+    held = hold_begins(frames.times[on], column[on]) if column is not None else None
     if "stress" not in values and nominal is not None and column is not None and held and held >= FEWEST_RAMP_FRAMES:
         # A load that was raised in sight is recorded better than the one number that says what was held.
         if area is None:
-            area = float(np.median(column[held:])) / nominal.value
+            area = float(np.median(column[on][held:])) / nominal.value
             how = f" by which the load that was held is {nominal.value:g} MPa"
     elif "stress" in values or conditions.states_load("stress"):
         return ["the load beside the stress not used"]
@@ -242,7 +243,8 @@ def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableF
 
 def _frames_of_ramp(times: Floats, stress: Floats) -> int:
     """The number of frames before a stress that was raised from nothing is held; 0 where the record shows no ramp."""
-    end = hold_begins(times, stress)
+    on = under_load(stress)  # pauses come after it
+    end = hold_begins(times[on], stress[on])
     is_short = end is not None and times[end] - times[0] <= SHORT_RAMP * (times[-1] - times[0])
     fewest = 1 if is_short else FEWEST_RAMP_FRAMES
     is_raised = end is not None and end >= fewest and stress[0] <= RAMP_FROM * stress[end]

@@ -21,7 +21,7 @@ error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.conditions import noise_correlation_text
@@ -40,7 +40,7 @@ from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import is_frame, names_time, sources_of_names
 from creepkit.readers.table_layouts import TabulatedTest
 from creepkit.readers.text_files import peek_table, read_head_alone
-from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms
+from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, split_unit
 from creepkit.records import (
     UNKNOWN_DURATION,
     History,
@@ -107,17 +107,33 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
     sheets = {test.table.sheet for test in tests}
     names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
     errors, histories = list[HistoryError](), list[History]()
+    tests = [
+        replace(one, table=replace(one.table, sources=(*one.table.sources, *sources_of_names(one.table, vocabulary))))
+        for one in tests
+    ]
+    _refuse_one_for_all(tests, vocabulary)
     for test, name in zip(tests, names, strict=True):
         table = test.table
         unique = f"{table.sheet}/{name}" if len(set(names)) < len(names) and table.sheet else name
         parts = [f"sheet {table.sheet}"] * bool(table.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(tests) > 1 else str(path)
-        table = replace(table, sources=(*table.sources, *sources_of_names(table, vocabulary)))
         make = partial(assemble_history, unique, test.entries, table, vocabulary, location=table.place, source=source)
         history = collected(errors, make)
         histories += [] if history is None else [history]
     raise_all(errors)
     return histories
+
+
+def _refuse_one_for_all(tests: Sequence[TabulatedTest], vocabulary: HeaderVocabulary) -> None:
+    """HistoryError where an answer for a file states one value, and the names and titles of its tests several."""
+    for key, (text, place) in vocabulary.stated.items():
+        found = split_unit(key, vocabulary.terms().conditions.kinds)
+        of_tests = ([one.text for one in test.table.sources if found and one.key == found[0]] for test in tests)
+        said = dict.fromkeys(texts[0] for texts in of_tests if texts)
+        if len(said) > 1:
+            several = " and ".join([*map(quoted, list(said)[:3]), *["others"] * (len(said) > 3)])
+            what = f"{key} {text} would hold for all tests of '{tests[0].table.path.name}', which say {several}"
+            raise HistoryError(f"{place}: {what}; remove it, or correct the file")
 
 
 @checked

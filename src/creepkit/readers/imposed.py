@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions, StatedNumber, TimeValuePairs, errors_located_at
 from creepkit.readers.frames import TableFrames
@@ -51,9 +51,9 @@ CONSTANT_RATE, RISING, LARGEST_MODULUS = 0.05, 0.97, 1e6
 this part of its median is still rising; MPa."""
 
 
-LONGEST_RAMP, SUSTAINED, STRAIGHT = 0.1, 0.5, 0.1
+LONGEST_RAMP, SUSTAINED, PAUSE, STRAIGHT = 0.1, 0.5, 0.1, 0.1
 """Of the duration of a test the ramp to what is held; of the largest stress what one that was imposed does not fall
-below; of its range by how much a strain that was imposed by its rate is off a straight line."""
+below, and below what a load is off; of its range by how much a strain imposed by its rate is off a straight line."""
 
 
 def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float | Program:
@@ -233,8 +233,9 @@ def _imposed_column(conditions: StatedConditions, frames: TableFrames, quantity:
 def _imposed_of(conditions: StatedConditions, frames: TableFrames, first: str, second: str) -> str:
     """Which of two quantities was imposed, where each may be the answer to the other: the stated or the held one.
 
-    A quantity is held where it stays once a ramp has reached it. Of two that change, a stress that never falls below
-    half of its largest was imposed, else a strain that grows by a constant rate; else it is asked for.
+    A quantity is held where it stays once a ramp has reached it. Of two that change, a stress that stays but for pauses
+    without load, or never falls below half of its largest, was imposed, else a strain that grows by a constant rate;
+    else it is asked for.
     """
     pair = sorted((first, second))
     stated = [q for q in pair if conditions.states_load(q)]
@@ -247,22 +248,26 @@ def _imposed_of(conditions: StatedConditions, frames: TableFrames, first: str, s
         return stated[0]
     columns = {q: frames.values[q] for q in pair}
     if pair == ["strain", "stress"] and _is_strained_at_constant_rate(frames.times, **columns):
-        conditions.record_assumption("strain imposed, for its rate is constant")
+        conditions.record_assumption("strain imposed (its rate is constant)")
         return "strain"
     held = [q for q, column in columns.items() if hold_begins(frames.times, column) is not None] or [
         q for q, column in columns.items() if _level_starts(column, LOAD_RECORD_TOLERANCE * float(np.ptp(column)))
     ]
     if len(held) == 1:
-        conditions.record_assumption(f"{held[0]} imposed, for its column is held")
+        conditions.record_assumption(f"{held[0]} imposed (its column is held)")
         return held[0]
     load = next(q for q in pair if q in conditions.terms.number_kinds)
-    other = pair[1 - pair.index(load)]
-    if held or columns[load].min() >= SUSTAINED * columns[load].max():
-        why = "both columns are held" if held else "it never falls below half of its largest"
-        conditions.record_assumption(f"{load} imposed, for {why}")
+    other, on = pair[1 - pair.index(load)], under_load(columns[load])
+    why = "both columns are held" if held else ""
+    if not held and not on.all() and hold_begins(frames.times[on], columns[load][on]) is not None:
+        why = "its column is held but for pauses"
+    elif columns[load].min() >= SUSTAINED * columns[load].max():
+        why = why or "it never falls below half of its largest"
+    if why:
+        conditions.record_assumption(f"{load} imposed ({why})")
         return load
     if _grows_steadily(frames.times, columns[other]):
-        conditions.record_assumption(f"{other} imposed, for its rate is constant")
+        conditions.record_assumption(f"{other} imposed (its rate is constant)")
         return other
     raise conditions.question(
         f"{load} and {other} both change, and nothing says which was imposed; write 'specimen: uniaxial' for an "
@@ -292,6 +297,17 @@ def hold_begins(times: Floats, column: Floats) -> int | None:
     is_ramp = bool((np.diff(column[: start + 1]) > -band).all()) and column[0] < level + band
     is_short = start < 2 or times[start] - times[0] <= LONGEST_RAMP * (times[-1] - times[0])
     return start if is_ramp and is_short else None
+
+
+def under_load(column: Floats) -> Bools:
+    """(frames,) Whether a load is on, or not yet: False in pauses at almost none after which its level returns.
+
+    column : (frames,) in any unit.
+    """
+    is_off, is_on = column < PAUSE * column.max(), column > SUSTAINED * column.max()
+    had_begun = np.logical_or.accumulate(is_on)
+    returns = np.logical_or.accumulate(is_on[::-1])[::-1]
+    return np.asarray(~(is_off & had_begun & returns))
 
 
 def _grows_steadily(times: Floats, column: Floats) -> bool:

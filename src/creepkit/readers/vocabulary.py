@@ -33,7 +33,7 @@ from creepkit.records.units import CAPITALS_THAT_MATTER, UNITS, spellings
 @lru_cache(maxsize=4096)
 def plain_name(name: str) -> str:
     """A name in small letters, with underscores for blanks, hyphens, points and what sets a unit apart."""
-    return re.sub(r"[\s_\-.()\[\],]+", "_", name.strip().casefold()).strip("_")
+    return re.sub(r"[\s_\-.()\[\],]+", "_", name.strip().casefold().replace("’", "'")).strip("_")
 
 
 def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:

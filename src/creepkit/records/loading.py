@@ -352,6 +352,10 @@ MOST_LEVELS = 4
 """Of a load, that are all named; of more, the first and the last."""
 
 
+RAMPED = 0.05
+"""Of the largest load, with which a record that holds the loading ramp begins at most."""
+
+
 def loading_text(loading: Loading, unit: str = "MPa") -> str:
     """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'.
 
@@ -370,8 +374,8 @@ def _levels_text(program: Program) -> str:
     held, values = _held_levels(program), program.values
     if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
         return " to ".join(f"{level:g}" for level in held)
-    if values[0] == 0.0 < values.max():  # a load that was recorded from its ramp on
-        return f"{values.max():g}"
+    if values[0] <= RAMPED * values.max():  # a load that was recorded from its ramp on
+        return f"{values[-1] if values[-1] > 0.5 * values.max() else values.max():.4g}"
     return f"{values[0]:g} to {values[-1]:g}"
 
 

@@ -33,17 +33,19 @@ class Presentable(NotebookCell):
     """A record that prints an answer of its own, in notebooks too; one of long answers has `details()`.
 
     shown_by : the function of creepkit.reports that gives the text, for those that have no `__str__` of their own.
+    detailed_by : that of its details, where these are more than the text.
     """
 
     __slots__ = ()
     shown_by: ClassVar[str] = ""
+    detailed_by: ClassVar[str] = ""
 
     def __str__(self) -> str:
         return str(function_of_reports(self.shown_by)(self)) if self.shown_by else repr(self)
 
     def details(self) -> str:
         """Everything that there is to say, as text."""
-        return str(self)
+        return str(function_of_reports(self.detailed_by)(self)) if self.detailed_by else str(self)
 
 
 class Plotted:

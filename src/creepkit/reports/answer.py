@@ -6,7 +6,7 @@ Terminal, notebook and page take their first lines from here. A sentence has 25 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, as_text, listed, named, number, plural, printable
+from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
 from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
@@ -209,8 +209,16 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     return [_of_mean(*one) for one in stated]
 
 
+def known_bounds(one: Any) -> tuple[float, float]:
+    """Of the mean, of a strength or a life: infinite where one of them is not known, NaN where none is."""
+    low, high = one.bounds_of_mean
+    if low is None and high is None:
+        return math.nan, math.nan
+    return (-math.inf if low is None else low), (math.inf if high is None else high)
+
+
 def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
-    low, high = (math.nan if bound is None else bound for bound in one.bounds_of_mean)
+    low, high = known_bounds(one)
     remark = f"mean of rupture methods{', extrapolated' * bool(one.extrapolation)}"
     return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
 
@@ -257,25 +265,25 @@ def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
         low = low / further if low > 0 else low - (high - low)
     wider = f"bounds = {{ {name} = [{number(low)}, {number(high)}] }}"
     end = "upper" if at_upper else "lower"
-    return _said("held", law=law, name=name, value=number(bound), end=end, wider=wider)
+    return CAUTIONS["held"].format(law=law, name=name, value=number(bound), end=end, wider=wider)
 
 
-def _said(kind: str, **values: object) -> str:
-    return CAUTIONS[kind].format(**values)
+RUNAWAY = 1.0
+"""Strain above what was measured, from which on a law has broken before the test."""
 
 
 def _contradictions(fit: Identification) -> Iterator[str]:
     """What keeps the law from describing the tests."""
     adequacy = fit.adequacy
     if not fit.converged:
-        yield _said("not converged")
+        yield CAUTIONS["not converged"]
     if adequacy is None:
-        yield _said("unknown")
+        yield CAUTIONS["unknown"]
         return
     if adequacy.unpredicted:
-        yield _said("unpredicted", tests=named(adequacy.unpredicted, "test"))
+        yield CAUTIONS["unpredicted"].format(tests=named(adequacy.unpredicted, "test"))
     if adequacy.contradicting is not None:
-        yield _said("contradicting")
+        yield CAUTIONS["contradicting"]
     if adequacy.is_explained and not adequacy.lies_in_tests:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
@@ -285,12 +293,13 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
-        yield _said("worst", test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
+        kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
+        yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
     if adequacy.remedies and not adequacy.explanations:
-        yield _said("remedy", remedy=adequacy.remedies[0])
-    yield from (_said("implausible", nuisance=one.description) for one in adequacy.implausible[:1])
+        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
+    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield _said("noise unknown")
+        yield CAUTIONS["noise unknown"]
 
 
 def _test(fit: Identification, name: str) -> str:
@@ -305,7 +314,7 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
         return
     unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
     if others:
-        yield _said("undecided", laws=named(others, "law"))
+        yield CAUTIONS["undecided"].format(laws=named(others, "law"))
     same = f"{ranking.best.law.name} above "  # a threshold
     yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
@@ -319,21 +328,21 @@ def _precision(fit: Identification) -> Iterator[str]:
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
-            yield _said(kind, by=by, names=named(names, "parameter"))
+            yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield _said("one test", test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
+        yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
         kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield _said("not included", kinds=kinds, change=change)
+        yield CAUTIONS["not included"].format(kinds=kinds, change=change)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:
     if quality is not None and quality.flags:
         tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
-        yield _said("suspect", tests=named(tests, "test"))
+        yield CAUTIONS["suspect"].format(tests=named(tests, "test"))
 
 
 # ---- the answer ------------------------------------------------------------------------------------------------------
@@ -384,11 +393,24 @@ def answer_text(
     return as_text([answer(fit, ranking, more=str(more), searched=searched)])
 
 
-def line_of_group(fit: Identification) -> str:
-    """The headline of one alloy of several, with its stress exponent and creep rate and where they hold."""
-    figures = [one for one in key_figures(fit) if one.name.endswith("stress exponent") or one.name == "creep rate"]
-    numbers = ", ".join(f"{one.name} {one.text}" for one in figures)
-    return f"{fit.headline}; {numbers} at {figures[0].where}" if figures else fit.headline
+def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) -> Table:
+    """The law, stress exponent and creep rate of each alloy of several, and what its tests say of the law.
+
+    groups : {name: (best law, whether its choice is decisive, None where it was not one)}.
+    """
+    rows = []
+    for name, (fit, decisive) in groups.items():
+        figures = {one.name.removeprefix("measured "): one.text for one in key_figures(fit)}
+        said = "?" if fit.adequacy is None else fit.adequacy.verdict_text
+        rate = figures.get("creep rate", "–").replace(" %/h", "")
+        numbers = (figures.get("stress exponent", "–"), rate, number(fit.tested_point.stress, 3))
+        choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
+        rows.append((name, titled_law(fit.law), *numbers, f"{said}{choice}"))
+    columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
+    caption = (
+        "in brackets: 95 % intervals; of a law that the tests contradict the measured stress exponent, and no rate"
+    )
+    return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
 def chosen_text(ranking: Ranking) -> str:

@@ -24,8 +24,8 @@ LONGEST_TEXT = 4000
 """Characters of a cell or paragraph; an error message may hold a name of any length."""
 
 
-MOST_LINES, WIDTH = 12, 100
-"""Of an answer in a terminal, and characters of a line."""
+MOST_LINES, WIDTH, LEAST_FOLDED = 12, 100, 30
+"""Of an answer in a terminal; characters of a line; and of the last column of a table, at the least."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,16 @@ class Table:
         numeric = [place for place, k in enumerate(kept) if k in self.numeric]
         return Table(self.caption, [self.columns[k] for k in kept], rows, numeric)
 
+    def folded(self, width: int) -> Table:
+        """The same with the last column on several lines where it would go beyond a width, or LEAST_FOLDED."""
+        before = [max(len(str(row[k])) for row in (self.columns, *self.rows)) for k in range(len(self.columns) - 1)]
+        room, rows = max(width - sum(before) - 2 * len(before), LEAST_FOLDED), list[list[Cell]]()
+        for row in self.rows:
+            first, *more = wrap(str(row[-1]), room) or [""]
+            rows.append([*row[:-1], first])
+            rows += [[*[""] * len(before), part] for part in more]
+        return Table(self.caption, self.columns, rows, self.numeric)
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -135,12 +145,12 @@ class Answer:
     kind: ClassVar[str] = "answer"
     headline: str
     tests: str
-    law: Cell
-    equations: Sequence[Rich]
-    values: Sequence[Sequence[Any]]
-    figures: Sequence[Sequence[str]]
-    cautions: Sequence[str]
-    next_step: str
+    law: Cell = ""
+    equations: Sequence[Rich] = ()
+    values: Sequence[Sequence[Any]] = ()
+    figures: Sequence[Sequence[str]] = ()
+    cautions: Sequence[str] = ()
+    next_step: str = ""
     remarks: Sequence[str] = ()
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
@@ -283,7 +293,7 @@ def _lines(block: Block) -> list[str]:
     if isinstance(block, Items):
         return [f"- {item}" for item in block.items]
     if isinstance(block, Table):
-        table = block.filled
+        table = block.filled.folded(WIDTH - 2)
         lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
         return ["", *([f"{table.caption}:"] if table.caption else []), *lines, ""]
     if isinstance(block, Formula):
@@ -296,7 +306,7 @@ def _lines(block: Block) -> list[str]:
 def _answer_lines(answer: Answer) -> list[str]:
     """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details."""
     pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
-    pieces.append(f"({answer.units})")
+    pieces += [f"({answer.units})"] if pieces else []
     head, lines = _indented(f"{answer.headline} ({answer.tests})", ""), list[str]()
     for text in (*map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
         lines += _indented(text)

@@ -27,7 +27,7 @@ ROWS, MOST_TICKS = 8, 8
 
 
 def design_text(design: Design) -> str:
-    """The advice, the best tests in a table, and of the law the chi-squares of the first in every direction."""
+    """The advice, the best tests in a table, and what else is to be said."""
     return as_text(design_blocks(design))
 
 
@@ -49,7 +49,6 @@ def design_blocks(design: Design, figures: PageFigures | None = None, of: str = 
                 shows_values=True,
             )
             blocks.append(picture)
-    blocks += _directions(design)
     reasons: dict[str, list[str]] = {}
     for description, reason in design.left_out:
         reasons.setdefault(kind_of_reason(reason), []).append(description)
@@ -78,21 +77,6 @@ def _table(design: Design) -> Table:
     return Table(caption, columns, rows, numeric=(1, 2, 3))
 
 
-def _directions(design: Design) -> list[Block]:
-    """The expected chi-squares of the plan, else of the first test, an item for each direction."""
-    first = design.plan[0] if design.plan else design.tests[0] if design.tests else None
-    expected = design.expected or (None if first is None else first.expectation)
-    if first is None or expected is None or not expected.chi_squares:
-        return []
-    items = [
-        f"if {each.reference_law} holds, the chi-square of {each.alternative_law} is expected {_by(each.expected)} "
-        f"than that of {each.reference_law} (now {_by(each.current)})"
-        for each in expected.chi_squares
-    ]
-    head = f"expected chi-squares with {'the plan' if len(design.plan) > 1 else first.description}:"
-    return [Paragraph(head), Items(items)]
-
-
 def order_text(design: Design) -> str:
     """By what the planned tests are ordered, as a sentence."""
     if design.goal != "law":
@@ -103,11 +87,6 @@ def order_text(design: Design) -> str:
         "information; tests that were judged over the uncertainty of the parameters stand before all that were judged "
         "at their estimates alone, which flatters them"
     )
-
-
-def _by(chi_square: float) -> str:
-    size = f"{abs(chi_square):.3g}" if abs(chi_square) < 1000.0 else f"{abs(chi_square):.0f}"
-    return f"{size} {'higher' if chi_square >= 0 else 'lower'}"
 
 
 def design_to_json(design: Design) -> dict[str, object]:

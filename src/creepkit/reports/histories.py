@@ -12,7 +12,7 @@ import numpy as np
 
 from creepkit.records import SECONDS_PER_HOUR, History, is_logarithmic, load_unit, output_named, output_unit
 from creepkit.records.specimen_lookup import lengths_by_default
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, aligned, as_text, plural
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
 from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import kind_of_test, program_text
@@ -30,15 +30,8 @@ MOST_VALUES = 4
 
 
 def histories_text(histories: Sequence[History]) -> str:
-    """A line for each thing of one test; for several a row each, then what holds for all or some of them."""
-    if len(histories) == 1:
-        (test,) = histories
-        name, end, frames, _ = _row(test)
-        lines = [_output_text(test, one) for one in test.outputs]
-        lines.append(frames.replace(" to ", " frames to ", 1) if lines else _rate_text(test))
-        return "\n  ".join([name, *lines, end, *_remarks(histories)])
-    table = _table(histories)
-    return "\n".join([*aligned(table.columns, table.rows), *_remarks(histories)])
+    """A row for each test, then what holds for all or some of them."""
+    return as_text([_table(histories), *map(Paragraph, _remarks(histories))]).strip("\n")
 
 
 def history_blocks(histories: Sequence[History], more: str = "") -> list[Block]:
@@ -48,7 +41,7 @@ def history_blocks(histories: Sequence[History], more: str = "") -> list[Block]:
 
 
 def _table(histories: Sequence[History]) -> Table:
-    return Table("", ("test: specimen, conditions", "end", "frames", "outputs"), [*map(_row, histories)])
+    return Table("", ("test: specimen, conditions", "end", "readings", "outputs"), [*map(_row, histories)])
 
 
 def _remarks(histories: Sequence[History]) -> list[str]:
@@ -89,7 +82,7 @@ def _row(history: History) -> tuple[str, ...]:
 
 
 def _count_text(count: int, total: int) -> str:
-    return "" if total == 1 else f" (all {total} tests)" if count == total else f" ({count} of {total} tests)"
+    return "" if count == total else f" ({count} of {total} tests)"
 
 
 def _strain_text(history: History) -> str:

@@ -16,7 +16,7 @@ from creepkit.inverse.nuisance_parameters import nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import NOT_INCLUDED, beyond_intervals
 from creepkit.inverse.tested_region import SAME_STRESS, stresses_at_temperatures
-from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION
+from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION, Correlation
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text
@@ -414,9 +414,8 @@ def _correlations(fit: Identification) -> list[Block]:
         return []
     if len(names) > MOST_CORRELATED:
         return [Paragraph(f"the correlations of {len(names)} parameters are in the file of the identification")]
-    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, matrix, strict=True)]
     caption = f"correlations of the estimates of {fit.law.name}; ln where the logarithm is estimated"
-    table = Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
+    table = correlation_table(correlation, caption)
     size = np.abs(np.triu(matrix, 1))
     if not size.max() > STRONG_CORRELATION:
         return [table]
@@ -427,6 +426,13 @@ def _correlations(fit: Identification) -> list[Block]:
         "interval; carry all digits, and take uncertainties of rates from the covariance, which is among the files"
     )
     return [table, Paragraph(together, "warning")]
+
+
+def correlation_table(correlation: Correlation, caption: str = "") -> Table:
+    """The matrix with its names."""
+    names = correlation.names
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
+    return Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
 
 
 # ---- comments of exports ---------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import unit_text
 from creepkit.reports.blocks import aligned
+from creepkit.reports.identification import correlation_table
 
 if TYPE_CHECKING:
     from creepkit.inverse.cross_validation import CrossValidation
@@ -44,9 +45,9 @@ def posterior_text(samples: PosteriorSamples) -> str:
 
 
 def correlation_text(correlation: Correlation) -> str:
-    """The matrix with its names, four digits."""
-    rows = [(name, *(f"{v:.4f}" for v in row)) for name, row in zip(correlation.names, correlation.matrix, strict=True)]
-    return "\n".join(aligned(("", *correlation.names), rows, numeric=range(1, 1 + len(rows))))
+    """The matrix with its names."""
+    table = correlation_table(correlation)
+    return "\n".join(aligned(table.columns, table.rows, table.numeric))
 
 
 def model_average_text(average: ModelAverage) -> str:

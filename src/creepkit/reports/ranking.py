@@ -1,4 +1,4 @@
-"""What a ranking of laws says: the laws with misfits and weights, what separates them, and the values of each."""
+"""What a ranking of laws says: the laws with misfits and weights, and what else the tests allow."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import CreepkitError
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, chi_square_by_test
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
@@ -50,14 +48,12 @@ def ranking_text(ranking: Ranking) -> str:
 
 
 def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str = "") -> list[Block]:
-    """The laws tried with misfits and weights, what separates them, and with `figures` the misfit of each law.
+    """The laws tried with misfits and weights, and with `figures` the misfit of each law in each test.
 
     of : the material, " of CMSX-4".
     """
     blocks: list[Block] = [_table(ranking)]
     blocks += [Paragraph(CHI_SQUARE_NOTE, "note")] if any(math.isfinite(one.chi_square) for one in ranking.laws) else []
-    separation = separating_test(ranking)
-    blocks += [Paragraph(text) for text in separation]
     if ranking.challenges:
         blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
     if ranking.failed:
@@ -66,7 +62,7 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
             f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
-            f"and the curves of the credible ones. {' '.join(separation)} Weights: {weights}."
+            f"and the curves of the credible ones. Weights: {weights}."
         )
         caption = f"Where the laws differ: {misfit_name(ranking)}."
         title = f"Misfit of each law in each test{of}"
@@ -84,52 +80,13 @@ def _table(ranking: Ranking) -> Table:
             number(one.excess, 3),
             f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
-            explanation(one.fit),
+            "?" if one.fit.adequacy is None else one.fit.adequacy.verdict_text,
         )
         for one in ranking.laws
     ]
-    columns = (
-        *("law", "parameters", "mean misfit", "test to test", f"{criterion_name(ranking)} - best"),
-        *("weight", "chi-square", "by the noise of the tests"),
-    )
+    behind = f"{ {'bic': 'BIC', 'aicc': 'AICc'}[ranking.criterion] } - best"
+    columns = ("law", "parameters", "mean misfit", "test to test", behind, "weight", "chi-square", "by the noise")
     return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
-
-
-def explanation(fit: Identification) -> str:
-    """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
-    return "?" if fit.adequacy is None else fit.adequacy.verdict_text
-
-
-def criterion_name(ranking: Ranking) -> str:
-    """The abbreviation of the criterion by which laws are ranked."""
-    return {"bic": "BIC", "aicc": "AICc"}[ranking.criterion]
-
-
-def separating_test(ranking: Ranking) -> list[str]:
-    """The test that speaks most for the best law against the second, and by how much the second is worse in all."""
-    if len(ranking.laws) < 2 or len(ranking.best.tests) < 2:
-        return []
-    fits, second = [one.fit for one in ranking.laws], ranking.laws[1]
-    if any(fit.linearised is None for fit in fits):
-        fits = fits[:2]  # others cost a prediction each
-    if any(fit.linearised is None and (not fit.histories or fit.predictor is None) for fit in fits):
-        return []
-    try:
-        chi_square = chi_square_by_test(fits)
-    except CreepkitError:
-        return []
-    differences = chi_square[1] - chi_square[0]
-    if not np.isfinite(differences).all():
-        return []
-    if min(float(differences.sum()), second.excess) < DISTINGUISHABLE_CHI_SQUARE:
-        return []
-    k, name = int(np.argmax(differences)), second.fit.law.name
-    share = 100 * float(differences[k]) / float(np.maximum(differences, 0.0).sum())
-    return [
-        f"what separates {name} from {fits[0].law.name} most is test {fits[0].tests[k].name} "
-        f"({fits[0].tests[k].condition}): {share:.0f} % of the chi-square that speaks against {name} is its own; "
-        f"{criterion_name(ranking)} of {name} is {number(second.excess, 3)} larger in all"
-    ]
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[str]:
@@ -149,8 +106,8 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     """Print the table of laws, the answer, and what was written."""
     table = _table(ranking)
     print_table(f"{test_count} tests", table.columns, [[*map(str, row)] for row in table.rows])
-    files = [path.name for path in written if path.suffix == ".json"]
-    tell(f"{answer_text(ranking.best, ranking, f'creepkit report {files[-1]}' if files else 'creepkit report')}\n")
+    files = [path for path in written if path.suffix == ".json"]  # the ranking, where there are several laws
+    tell(f"{answer_text(ranking.best, ranking, ' '.join(('creepkit report', *map(str, files[:1]))))}\n")
     for path in written:
         tell_written(path)
 

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, ends, plural, plural_of
+from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
+from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
+from creepkit.reports.words import RUPTURE
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
@@ -42,23 +45,62 @@ PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
 def rupture_text(assessment: RuptureAssessment) -> str:
+    """The method, the strengths of each temperature, what to mind and what to do next."""
+    return as_text([rupture_answer(assessment)])
+
+
+def rupture_details(assessment: RuptureAssessment) -> str:
     """The verdict, then methods, strengths and checks, and the notes."""
     return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
 
 
+def rupture_answer(assessment: RuptureAssessment) -> Answer:
+    """It in few lines."""
+    weights, best, longest = assessment.methods, assessment.best, 10 ** float(assessment.tests.log_time.max())
+    credible = [name for name, weight in weights.items() if weight > CREDIBLE_WEIGHT]
+    stated = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
+    far = max((one.hours for one in stated), default=0.0)
+    failed = [one.fault or one.name for one in assessment.checks if one.passed is False]
+    warned = [RUPTURE["fails"].format(best=best.method, check=check) for check in failed]
+    beyond = far > LONGEST_EXTRAPOLATION * longest
+    warned += [RUPTURE["extrapolated"].format(hours=f"{far:g}", longest=f"{longest:.4g}")] if beyond else []
+    lives = rupture_figures(assessment)[: len(assessment.lives)]
+    figures = [(one.name, one.where, one.text, one.remark) for one in lives]
+    for T in dict.fromkeys(one.temperature for one in stated):
+        alike = [one for one in stated if one.temperature == T]
+        texts = [interval_text((one.value or 0.0, *known_bounds(one))) for one in alike]
+        hours = ", ".join(f"{one.hours:g}" for one in alike)
+        figures.append(("strength", celsius_text(T, digits=0), f"{', '.join(texts)} MPa", f"at {hours} h"))
+    kind = "several" if len(credible) > 1 else "decisive" if assessment.decisive else "single"
+    kind = "only" if len(weights) == 1 else kind
+    following = "longer" if beyond else "check" if failed else "strengths"
+    return Answer(
+        RUPTURE[kind].format(best=best.method, names=listed(credible)),
+        _tests_text(assessment),
+        figures=figures,
+        cautions=warned,
+        next_step=RUPTURE[following].format(hours=f"{float(f'{far / LONGEST_EXTRAPOLATION:.2g}'):g}"),
+        more=".details(), or creepkit rupture --json",
+    )
+
+
 def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
     """The tests, the verdict, and the strengths of the average method in a table."""
-    tests = assessment.tests
-    span = f"{ends(tests.stress)} MPa, {ends(tests.temperature - ZERO_CELSIUS)} °C"
-    heats = "".join(f", {len(set(v))} {plural_of(group)}" for group, v in tests.groups.items())
-    head = (
-        f"{len(tests)} rupture tests, {int(tests.censored.sum())} of them run-outs, {span}, up to "
-        f"{10 ** float(tests.log_time.max()):.4g} h{heats}"
-    )
     table, note = _strengths(assessment)
     said = [Paragraph(note, "note")] if note else []
     lives = [_lives(assessment)] if assessment.lives else []
-    return [Paragraph(assessment.verdict, "lead"), Paragraph(head), *lives, table, *said]
+    head = Paragraph(_tests_text(assessment))
+    return [Paragraph(assessment.verdict, "lead"), head, *lives, table, *said]
+
+
+def _tests_text(assessment: RuptureAssessment) -> str:
+    """How many tests of what, and until when."""
+    tests = assessment.tests
+    span = f"{ends(tests.stress)} MPa, {ends(tests.temperature - ZERO_CELSIUS)} °C"
+    heats = "".join(f", {len(set(v))} {plural_of(group)}" for group, v in tests.groups.items())
+    run_outs = int(tests.censored.sum())
+    of = f"{len(tests)} rupture tests{f', {run_outs} run-outs' if run_outs else ''}"
+    return f"{of}, {span}, to {10 ** float(tests.log_time.max()):.4g} h{heats}"
 
 
 def _lives(assessment: RuptureAssessment) -> Table:

@@ -9,10 +9,10 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.reports.answer import interval_text
-from creepkit.reports.blocks import aligned
+from creepkit.reports.blocks import Paragraph, Table, as_text
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
-from creepkit.reports.terminal import print_json, print_table, tell
+from creepkit.reports.terminal import print_json, tell
 from creepkit.screening.results import (
     COMPARISON_STRESS,
     AlloyResult,
@@ -39,7 +39,7 @@ def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
 
 def screening_text(plate: ScreeningResult) -> str:
     """The table, the share of each law in each class, and what failed."""
-    return "\n".join([*aligned(TABLE_COLUMNS, table_rows(plate)), "", *summary_lines(plate)])
+    return as_text([Table("", TABLE_COLUMNS, table_rows(plate)), *map(Paragraph, summary_lines(plate))])
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:
@@ -135,9 +135,8 @@ def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) 
     if as_json:
         print_json(_plate_to_json(plate, written))
         return
-    print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
-    for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
-        tell(line)
+    for text in (plate, *(f"wrote {path}" for path in written)):
+        tell(text)
 
 
 def _plate_to_json(plate: ScreeningResult, written: list[Path]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import typer
 
 from creepkit import errors
 from creepkit.jobs.progress import duration_text, series_of_task
+from creepkit.reports.blocks import Table, as_text
 
 
 def printable(text: str) -> str:
@@ -41,18 +42,8 @@ def put(text: str) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table as wide as the terminal, or 120 columns elsewhere; cells are plain text, the first never breaks."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=Text(printable(title), "table.title") if title else None, title_justify="left")
-    for k, column in enumerate(columns):
-        table.add_column(Text(printable(column)), overflow="fold", no_wrap=k == 0)
-    for row in rows:
-        table.add_row(*(Text(printable(cell)) for cell in row))
-    console = Console()
-    (console if console.is_terminal else Console(width=120)).print(table)
+    """Print a table; title : "" for none."""
+    tell(as_text([Table(title, columns, [*rows])]).strip("\n"))
 
 
 def print_json(value: Any) -> None:

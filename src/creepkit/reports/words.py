@@ -36,6 +36,7 @@ CAUTIONS = {
     "unpredicted": "it does not predict every reading of {tests}",
     "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
     "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
+    "runs away": "it is worst in {test}: by the law it has broken by {time}",
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
     "implausible": "it takes {nuisance}, far from what was stated",
     "noise unknown": "the noise of readings is not known: the law cannot be judged",
@@ -72,6 +73,20 @@ BRACKETS = (
     "The mean misfit is over the tests that were fitted."
 )
 """Below the numbers of an answer."""
+
+
+RUPTURE = {
+    "several": "use the mean of {names}: the tests cannot tell them apart",
+    "decisive": "use {best}, which passes all checks",
+    "single": "use {best}, which has nearly all the weight",
+    "only": "use {best}, the only method that was fitted",
+    "fails": "{best} fails: {check}",
+    "extrapolated": "strengths at {hours} h are extrapolated: the longest test has {longest} h",
+    "longer": "test to {hours} h: strengths beyond three times the longest test are extrapolated",
+    "check": "look at the tests of the check that fails",
+    "strengths": "use these strengths with their bounds",
+}
+"""{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
 
 
 TRY = {

@@ -305,6 +305,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         return write_assessment(self, path)
 
     shown_by = "rupture.rupture_text"
+    detailed_by = "rupture.rupture_details"
 
 
 ISOTHERMAL_TOLERANCE = 5.0

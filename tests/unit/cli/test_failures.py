@@ -107,7 +107,7 @@ def test_controls_are_shown_as_codes_and_lines_and_tabs_stay(capsys: pytest.Capt
     terminal.ProgressBar().tick("file \x1b[31m", 1, 1, "\x07")
     terminal.put('{"name": "\x1b"}')
     out, err = capsys.readouterr()
-    assert out.startswith("two\tcolumns\nred \\u001b[31m \\u0007 \\u000d \\u009b \\u202e end\nof \\u001b[31m [bold] ")
+    assert out.startswith("two\tcolumns\nred \\u001b[31m \\u0007 \\u000d \\u009b \\u202e end\nof \\u001b[31m [bold]:\n")
     assert "\\u0007 [red]" in out
     assert "cell \\u001b[31m [/red]" in out
     assert out.endswith('{"name": "\x1b"}')

@@ -150,6 +150,29 @@ def test_a_knocked_extensometer_is_found_in_few_readings_and_not_where_there_was
     assert np.mean([flag.jumps["b"] for _, flag in found]) == pytest.approx(3.6e-4, rel=0.1)
 
 
+@pytest.mark.parametrize("step", [-2.4e-4, 2.4e-4])
+def test_a_knock_between_uneven_readings_is_neither_an_outlier_nor_idle_time(step):
+    """80 times the noise, in readings over decades, evenly and a few at random: of 30, 27 or more are steps."""
+    rng, kinds = np.random.default_rng(3), []
+    for _ in range(30):
+        hours = np.unique(np.r_[np.geomspace(0.03, 100, 60), np.linspace(1, 100, 50), rng.uniform(1, 100, 5)])
+        strain = 1e-4 * hours + 3e-6 * rng.standard_normal(hours.size) + step * (hours > rng.uniform(20, 90))
+        test = History("b", 3600.0 * hours, {"strain": strain}, constant_stress(300.0), 673.0)
+        kinds.append({flag.kind for flag in check_data_quality([test])})
+    assert kinds.count({"jump"}) >= 26
+    assert not set.union(*kinds) & {"outlier", "idle"}
+
+
+def test_primary_creep_in_the_first_hundredths_of_a_curve_to_rupture():
+    """1 % of hardening before 20 % of softening, readings over decades; none where the rate only rises."""
+    x = np.unique(np.r_[np.geomspace(2e-4, 0.99, 60), np.linspace(0.01, 0.99, 60)])
+    noise = 2e-5 * np.random.default_rng(1).standard_normal(x.size)
+    for primary in (0.01, 0.0):
+        strain = -0.04 * np.log(1 - x) + primary * (1 - np.exp(-x / 0.01)) + noise
+        test = History("b", 3.6e5 * x, {"strain": strain}, constant_stress(300.0), 673.0)
+        assert shows_primary_creep(test) == (primary > 0.0)
+
+
 def test_a_jump_of_the_camera_is_one_finding_for_all_tests():
     rng = np.random.default_rng(5)
     tests = [dimple(rng, k, jump=0.02) for k in range(2, 8)]

@@ -60,7 +60,7 @@ def test_a_held_column_of_strain_beside_a_falling_stress_is_a_relaxation(read):
     history = read(HOT + "# modulus_GPa: 150\n" + body)
     assert (history.specimen, list(history.outputs)) == ("relaxation", ["stress"])
     assert history.loading.program().values.tolist() == [0.002]
-    assert "strain imposed, for its column is held" in assumed(history)
+    assert "strain imposed (its column is held)" in assumed(history)
     named = read(HOT + "# modulus_GPa: 150\n# specimen: relaxation\n" + body)
     assert named.loading == history.loading
 
@@ -402,16 +402,16 @@ def test_what_was_imposed(tmp_path: Path) -> None:
     ramped, strain = np.minimum(times / 60, 1.0) * 120.0, 1e-9 * times
     names, head = "time_s,strain_1,stress_MPa", "# modulus_GPa: 160\n"
     test = read_bar(tmp_path, creep(names, list(zip(times, strain, ramped, strict=True)), head))
-    assert "stress imposed, for its column is held" in test.labels["assumed"]
+    assert "stress imposed (its column is held)" in test.labels["assumed"]
     rate = 1e-7 * times
     stress = 200.0 * (1.0 - np.exp(-rate / 2e-3))
     test = read_bar(tmp_path, creep(names, list(zip(times, rate, stress, strict=True)), head))
-    assert (test.specimen, "strain imposed, for its rate is constant" in test.labels["assumed"]) == ("relaxation", True)
+    assert (test.specimen, "strain imposed (its rate is constant)" in test.labels["assumed"]) == ("relaxation", True)
     for first in (14.0, 18.0, 25.0):  # MPa of the first of 80 frames behind the elastic part, of a tensile test
         rate = np.linspace(5e-4, 4e-2, 80)
         stress = first + (34.0 - first) * (1.0 - np.exp(-(rate - 5e-4) / 6e-3)) + 0.25 * np.sin(np.arange(80))
         test = read_bar(tmp_path, creep(names, list(zip(rate / 1e-4, rate, stress, strict=True)), head))
-        assert (test.specimen, "strain imposed, for its" in test.labels["assumed"]) == ("relaxation", True), first
+        assert (test.specimen, "strain imposed (its" in test.labels["assumed"]) == ("relaxation", True), first
         np.testing.assert_allclose(test.loading.program().at(np.array([0.0, 2.0, 200.0])), [0, 2e-4, 2e-2], atol=1e-9)
     swinging = 100.0 * (1.05 + np.sin(np.arange(times.size)))
     with pytest.raises(HistoryError, match="stress and strain both change.*specimen: uniaxial.*specimen: relaxation"):
@@ -424,3 +424,37 @@ def test_readings_within_the_noise_of_zero_may_be_negative(tmp_path: Path) -> No
     assert test.loading.program().at(np.array([0.0]))[0] == 0.0
     with pytest.raises(HistoryError, match="is -5; a stress must lie"):
         read_bar(tmp_path, creep("time_h,strain_1,stress_MPa", [(0.0, 0.0, -5.0), *rows[1:]]))
+
+
+def test_a_file_of_a_testing_machine_with_an_interruption(tmp_path: Path) -> None:
+    """Force and extension with a loading ramp, a pause without load and a remark: as the machine wrote it.
+
+    Planted: Norton's rate of strain, 150 GPa, a furnace that failed between 40 and 80 h, rupture at 140 h.
+    """
+    area, length, stress, modulus, rng = 0.25 * np.pi * 8.0**2, 40.0, 160.0, 150e3, np.random.default_rng(5)
+    clock = np.r_[
+        np.linspace(0.0, 0.01, 7), np.geomspace(0.02, 39.9, 40), np.linspace(40.1, 79, 8), np.linspace(80, 140, 40)
+    ]
+    loaded = np.where(clock < 40.0, clock, np.maximum(clock - 40.0, 40.0))
+    load = np.where((clock > 40.0) & (clock < 79.5), 25.0 / area, stress * np.minimum(clock / 0.01, 1.0))
+    strain = 1e-4 * loaded + load / modulus + 1e-6 * rng.standard_normal(clock.size)
+    force = area * load + 4.0 * rng.standard_normal(clock.size)
+    head = "Prüfmaschine;Zwick\nProbe;P2\nProbendurchmesser d0;8,00;mm\nMesslänge L0;40,00;mm\nPrüftemperatur;600;°C\n"
+    head += "Bemerkung;Bruch in Messlänge\n\nZeit;Kraft;Verlängerung;Temperatur\nh;N;mm;°C\n"
+    rows = [
+        f"{t:.4f};{f:.1f};{length * e:.5f};600.{k % 3}"
+        for k, (t, f, e) in enumerate(zip(clock, force, strain, strict=True))
+    ]
+    (tmp_path / "P2.csv").write_text(head + "\n".join(rows).replace(".", ",") + "\n", "cp1252")
+    (test,) = ck.read_histories(tmp_path / "P2.csv")
+    assert (test.specimen, test.loading.quantity, test.includes_elastic) == ("uniaxial", "stress", True)
+    assert test.elastic is not None
+    assert test.elastic.at(873.15).E == pytest.approx(modulus, rel=0.05)
+    assert test.rupture_time == pytest.approx(3600.0 * 140.0)
+    assert test.labels["Bemerkung"] == "Bruch in Messlänge"
+    np.testing.assert_allclose(
+        test.loading.program().at(3600.0 * np.array([20.0, 60.0, 100.0])), [160, 0.5, 160], atol=0.1
+    )
+    assert test.used.tolist() == (clock > 0.009).tolist()
+    fit = ck.identify(ck.law("norton").fix(n=1.0), [test], nuisances=())
+    assert float(fit.rate(160.0, 873.15)[0]) == pytest.approx(1e-4 / 3600.0, rel=0.02)

@@ -437,7 +437,7 @@ def test_a_constant_rate_of_strain_is_recognised(tmp_path):
         assert (one.specimen, one.loading.quantity) == ("relaxation", "strain")
         np.testing.assert_allclose(one.loading.program().at(one.times), 1e-2 * times, atol=3e-3)
         np.testing.assert_allclose(one.outputs["stress"], stress, atol=0.01)
-        assert "strain imposed, for its rate is constant" in one.labels["assumed"]
+        assert "strain imposed (its rate is constant)" in one.labels["assumed"]
         assert ("magnitudes of negative stress and strain" in one.labels["assumed"]) == (sign < 0)
     creep = [f"{t:.2f};{1e-4 * t:.6f};{112.0 * (t > 0):.1f}" for t in times]
     (tmp_path / "c.csv").write_text(head + "\n".join(creep))

@@ -18,18 +18,17 @@ from creepkit.errors import HistoryError, ReportError
 from creepkit.exporters.documents import equations_in_latex, law_equations
 from creepkit.inverse.identify import identify
 from creepkit.inverse.perturbation import Perturbation, combined_change_text
-from creepkit.inverse.selection.discrimination import chi_square_by_test
+from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import Histories
 from creepkit.reports.answer import cautions, interval_digits, key_figures, next_step
-from creepkit.reports.blocks import number, typeset
+from creepkit.reports.blocks import typeset
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
-from creepkit.reports.ranking import separating_test
 from creepkit.reports.rate_panels import plate_figure
 from helpers.rate_tables import whole_life_table
 from helpers.report_pages import contents, ranking
@@ -303,22 +302,10 @@ def test_a_law_that_the_search_holds_says_so_first() -> None:
     assert next_step(lost).startswith("repeat the search with more starts (--starts 4, or starts in a study)")
 
 
-# ---- what separates two laws ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("weights", ["likelihood", "noise"])
-def test_what_separates_two_laws_is_stated_by_the_number_of_the_ranking(weights: str) -> None:
-    found = ranking_by(weights, wide=True)
-    (text,) = separating_test(found)
-    assert text.endswith(f"is {number(found.laws[1].excess, 3)} larger in all")
-    share = float(re.findall(r"(\d+) % of the chi-square", text)[0])
-    assert 25.0 <= share <= 100.0  # the largest of four
-
-
 def test_laws_of_equal_weights_are_compared_at_their_optima_under_the_common_covariance() -> None:
     """No other values of a law have a smaller chi-square there: those of the identification itself have none."""
     fits = [one.fit for one in ranking_by("noise", wide=True).laws]
-    at_optimum = chi_square_by_test(fits).sum(axis=1)
+    at_optimum = under_common_covariance(fits).chi_square
     problem = fits[0].least_squares_problem
     for fit, least in zip(fits, at_optimum, strict=True):
         own = fit.least_squares_problem

@@ -28,7 +28,7 @@ def test_only_what_changed_runs_again(study: Path) -> None:
     everything = {"quality", "forecast of next", *groups}
     first = ck.Study.load(study).run()
     assert made(first) == everything
-    assert "A: strain at 50 h, " in report_html(first.report_contents()).partition('id="materials"')[0]
+    assert "A: strain at 50\xa0h, " in report_html(first.report_contents()).partition('id="materials"')[0]
     assert made(ck.Study.load(study).run()) == set()
 
     one = study.parent / "data" / "planted_850C_70MPa.csv"

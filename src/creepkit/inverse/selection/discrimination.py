@@ -248,12 +248,6 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
     return tuple(sorted(pairs, key=lambda pair: pair.chi_square))
 
 
-def chi_square_by_test(fits: Sequence[Identification]) -> Floats:
-    """(laws, tests) - chi-square of laws in each test at their optima under one covariance, without priors."""
-    whitened = under_common_covariance(fits).whitened
-    return np.asarray((whitened.reshape(len(fits), len(fits[0].tests), -1) ** 2).sum(axis=2))
-
-
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:
     """(name of the richer law, "m = 0") where one law with a parameter off is the other, within its interval."""
     for richer, simpler in ((first, second), (second, first)):

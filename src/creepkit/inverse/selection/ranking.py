@@ -13,7 +13,7 @@ frames and nuisance parameters and usual errors of tests integrated out. Weights
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -200,16 +200,12 @@ class Ranking(Presentable, Plotted, Tabulated):
 
     drawn_by = "ranking.ranking_figure", "ranking.draw_misfits"
 
+    detailed_by = "ranking.ranking_text"
+
     def __str__(self) -> str:
         from creepkit.reports.answer import answer_text
 
         return answer_text(self.best, self)
-
-    def details(self) -> str:
-        """Everything that there is to say, as text."""
-        from creepkit.reports.ranking import ranking_text
-
-        return ranking_text(self)
 
 
 def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
@@ -250,10 +246,13 @@ def rank(
     criterion: Criterion = "bic",
     failed: Mapping[str, str] | None = None,
     *,
+    further: Collection[str] = (),
     challenge: bool = True,
 ) -> Ranking:
     """Rank identifications made from the same histories, with weights and a verdict; criterion : "bic" or "aicc".
 
+    further : names of laws that nobody asked for. One that the tests contradict, too, comes last where it predicts
+        tests worse, each left out, than a law that was asked for: it only bends further to the curves at hand.
     challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
         is decisive.
     """
@@ -269,11 +268,21 @@ def rank(
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
     score = chi_square + common.log_determinant + [penalty(count, independent_frames) for count in counts]
+    score = np.where(_are_outdone(fits, further), np.inf, score)
     ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed,
         rates=RatesOverTests(fits),
     )  # fmt: skip
     return challenged(ranking) if challenge else ranking
+
+
+def _are_outdone(fits: Sequence[Identification], further: Collection[str]) -> list[bool]:
+    """(laws,) Whether it was not asked for, is contradicted, and one that was asked for predicts tests better."""
+    least = min((fit.prediction_error for fit in fits if fit.law.name not in further), default=np.nan)
+    return [
+        fit.law.name in further and fit.adequacy is not None and fit.adequacy.rejects and fit.prediction_error > least
+        for fit in fits
+    ]
 
 
 def challenged(ranking: Ranking) -> Ranking:

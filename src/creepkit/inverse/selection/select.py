@@ -80,10 +80,11 @@ def select(
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
-    ranking = rank(fits, criterion, failed)
+    ranking = rank(fits, criterion, failed, further=tried_further)
     if not ranking.best.converged:
         best = _repeated(ranking.best, using, settings, through)
-        ranking = rank([best if fit is ranking.best else fit for fit in fits], criterion, failed)
+        fits = [best if fit is ranking.best else fit for fit in fits]
+        ranking = rank(fits, criterion, failed, further=tried_further)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)
@@ -122,7 +123,7 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
-    sums = [laws[0] + other for other in laws[1:]]
+    sums = [laws[0] + other for other in laws[1:] if not (laws[0].states and other.states)]  # a piece breaks once
     free = {name for law in laws for name in law.names}
     fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}
     suited = [_with_fixed(law, fixed) for law in suited]
