@@ -63,26 +63,26 @@ def command(
 
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
-    from creepkit.reports.answer import answer_text, asked_figures, line_of_group, rupture_figures
+    from creepkit.reports.answer import answer_text, asked_figures, rupture_figures, table_of_groups
+    from creepkit.reports.blocks import as_text, plural
 
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
     if told:
         print_table("", ("stage", "state", ""), told)
     for exclusion in result.exclusions:
-        count = len(exclusion.frames)
-        frames = f", {count} frame{'s' if count > 1 else ''}" if count else ""
+        frames = f", {plural(len(exclusion.frames), 'frame')}" if exclusion.frames else ""
         tell(f"left out: {exclusion.test}{frames}: {exclusion.reason}")
-    if result.forecasts or result.rupture:
-        of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
-        lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
-        lines += [one.line for assessment in result.rupture.values() for one in rupture_figures(assessment)]
-        for line in lines[:MOST_FIGURES]:
-            tell(line)
-    for group, ranking in result.rankings.items():
-        alone = len(result.rankings) == 1
-        best = ranking.best
-        tell(answer_text(best, ranking, result.report) if alone else f"{group}: {line_of_group(best)}")
+    of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
+    lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
+    lines += [one.line for assessment in result.rupture.values() for one in rupture_figures(assessment)]
+    for line in lines[:MOST_FIGURES]:
+        tell(line)
+    rankings = result.rankings
+    for ranking in [*rankings.values()][: len(rankings) == 1]:
+        tell(answer_text(ranking.best, ranking, result.report))
+    if len(rankings) > 1:
+        tell(as_text([table_of_groups({name: (one.best, one.decisive) for name, one in rankings.items()})]))
     if result.report is not None:
         tell(f"report: {result.report}")
 

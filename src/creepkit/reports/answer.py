@@ -6,7 +6,7 @@ Terminal, notebook and page take their first lines from here. A sentence has 25 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, as_text, listed, named, number, plural, printable
+from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
 from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
@@ -393,11 +393,24 @@ def answer_text(
     return as_text([answer(fit, ranking, more=str(more), searched=searched)])
 
 
-def line_of_group(fit: Identification) -> str:
-    """The headline of one alloy of several, with its stress exponent and creep rate and where they hold."""
-    figures = [one for one in key_figures(fit) if one.name.endswith("stress exponent") or one.name == "creep rate"]
-    numbers = ", ".join(f"{one.name} {one.text}" for one in figures)
-    return f"{fit.headline}; {numbers} at {figures[0].where}" if figures else fit.headline
+def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) -> Table:
+    """The law, stress exponent and creep rate of each alloy of several, and what its tests say of the law.
+
+    groups : {name: (best law, whether its choice is decisive, None where it was not one)}.
+    """
+    rows = []
+    for name, (fit, decisive) in groups.items():
+        figures = {one.name.removeprefix("measured "): one.text for one in key_figures(fit)}
+        said = "?" if fit.adequacy is None else fit.adequacy.verdict_text
+        rate = figures.get("creep rate", "–").replace(" %/h", "")
+        numbers = (figures.get("stress exponent", "–"), rate, number(fit.tested_point.stress, 3))
+        choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
+        rows.append((name, titled_law(fit.law), *numbers, f"{said}{choice}"))
+    columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
+    caption = (
+        "in brackets: 95 % intervals; of a law that the tests contradict the measured stress exponent, and no rate"
+    )
+    return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
 def chosen_text(ranking: Ranking) -> str:

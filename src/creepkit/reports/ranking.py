@@ -80,18 +80,13 @@ def _table(ranking: Ranking) -> Table:
             number(one.excess, 3) if math.isfinite(one.excess) else "–",
             f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
-            explanation(one.fit),
+            "?" if one.fit.adequacy is None else one.fit.adequacy.verdict_text,
         )
         for one in ranking.laws
     ]
     behind = f"{ {'bic': 'BIC', 'aicc': 'AICc'}[ranking.criterion] } - best"
     columns = ("law", "parameters", "mean misfit", "test to test", behind, "weight", "chi-square", "by the noise")
     return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
-
-
-def explanation(fit: Identification) -> str:
-    """Whether the tests contradict a law at their noise, with the p-value, and what it leaves, in noises."""
-    return "?" if fit.adequacy is None else fit.adequacy.verdict_text
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[str]:

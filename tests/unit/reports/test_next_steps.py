@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.reports.answer import line_of_group
+from creepkit.reports.answer import table_of_groups
 from creepkit.reports.next_steps import further_test, law_to_try
 
 STRESSES = np.array([80.0, 110.0, 150.0, 200.0])
@@ -52,7 +52,10 @@ def test_two_power_laws_that_cross_amid_the_tests_are_told_apart_at_their_end_an
     assert further_test(steady, steady) is None
 
 
-def test_the_line_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_intervals(steady):
-    found = re.search(r"stress exponent (\S+) \[.*\], creep rate (\S+) %/h \[.*\] at (\S+) MPa", line_of_group(steady))
-    assert "norton" in line_of_group(steady)
-    assert [float(one) for one in found.groups()] == pytest.approx([4.0, 1e-9 * 3.6e5, AMID], rel=0.03)
+def test_the_row_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_intervals(steady):
+    ((name, law, exponent, rate, stress, _),) = table_of_groups({"A1": (steady, True)}).rows
+    assert (name, str(law)) == ("A1", "norton")
+    ends = [[float(one) for one in re.findall(r"[\d.e-]+", cell)] for cell in (exponent, rate)]
+    assert [values[0] for values in ends] == pytest.approx([4.0, 1e-9 * 3.6e5], rel=0.03)
+    assert all(low < value < high for value, low, high in ends)
+    assert float(stress) == pytest.approx(AMID, rel=0.01)

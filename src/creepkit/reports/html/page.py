@@ -11,17 +11,8 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from creepkit.discovery.temperature_law import TemperatureLaw
-from creepkit.inverse.perturbation import combined_change_text
 from creepkit.inverse.uncertainty.correlation import LOOSE
-from creepkit.reports.answer import (
-    KeyFigure,
-    answer,
-    asked_figures,
-    interval_text,
-    rate_exponent_and_energy,
-    rupture_figures,
-    titled_law,
-)
+from creepkit.reports.answer import KeyFigure, answer, asked_figures, rupture_figures, table_of_groups
 from creepkit.reports.attachments import embed
 from creepkit.reports.blocks import (
     Answer,
@@ -57,7 +48,7 @@ from creepkit.reports.identification import (
 from creepkit.reports.identification_plot import summary_figures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
-from creepkit.reports.ranking import equivalents_among_remaining, explanation, ranking_blocks
+from creepkit.reports.ranking import equivalents_among_remaining, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
@@ -75,7 +66,7 @@ MOST_TEST_FIGURES = 160
 
 
 MOST_RANKINGS_DRAWN = 12
-"""Groups up to which the misfit of each law in each test is drawn as well."""
+"""Groups up to which the misfit of each law in each test is drawn as well, and their table stands open."""
 
 
 def report_html(contents: ReportContents) -> str:
@@ -247,7 +238,9 @@ def _group_sections(contents: ReportContents, figures: PageFigures) -> Iterator[
     if len(found) == 1:
         yield from _sections_of(found[0], figures, "", most, drawn=drawn)
     elif found:
-        yield PageSection("materials", "Materials", [_table_of_groups(found)], result="rates and exponents, a table")
+        table = table_of_groups({one.name: (one.fit, one.decisive) for one in _by_law(found)})
+        folded = "rates and exponents, a table" if len(found) > MOST_RANKINGS_DRAWN else ""
+        yield PageSection("materials", "Materials", [table], result=folded)
         for k, one in enumerate(_by_law(found), start=1):
             own = [contents.forecasts[name] for name, group in contents.forecast_groups.items() if group == one.name]
             first = group_answer(one, figures, asked=[figure for forecast in own for figure in asked_figures(forecast)])
@@ -281,36 +274,6 @@ def _sections_of(
     scatter = f"rates of tests scatter by {scatter_of_rates(fit)}"
     said = scatter if len(fit.tests) > 1 else "of the readings of one test"
     yield PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", noise_blocks(fit), result=said)
-
-
-def _table_of_groups(found: Sequence[ReportGroup]) -> Table:
-    rows = []
-    for one in found:
-        fit = one.fit
-        rate, exponent, _ = map(interval_text, rate_exponent_and_energy(fit))
-        properties = (rate, combined_change_text(fit.unmodelled) or "–", exponent)
-        rows.append(
-            (
-                one.name,
-                titled_law(fit.law),
-                "–" if one.ranking is None else f"{one.ranking.laws[0].weight:.2f}",
-                explanation(fit),
-                "–" if one.decisive is None else "yes" if one.decisive else "no",
-                number(fit.tested_point.stress, 3),
-                *(("–", "–", "–") if rejected(fit) else properties),
-            )
-        )
-    columns = (
-        *("material", "best law", "weight", "by the noise of the tests", "decisive", "at MPa"),
-        *("creep rate there, 1/s", "rate: not in the interval", "stress exponent"),
-    )
-    caption = (
-        "materials, with 95 % intervals; rate and stress exponent at constant strain, amid the tests, of laws that fit "
-        "the tests. Not in the interval: what errors common to all tests would move the rate by, such as of "
-        "temperature and load (root sum of squares). Decisive: one law has more than 95 % of the weight, the tests do "
-        "not contradict it, and nothing else that was tried does better; the verdict of each material says the rest"
-    )
-    return Table(caption, columns, rows, numeric=(2, 5, 6, 7, 8))
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------
