@@ -391,8 +391,12 @@ def multiplied(
     reference: str,
     *,
     name: str | None = None,
+    states: Mapping[sympy.Symbol, State] | None = None,
 ) -> Law:
-    """Multiply the rates of all terms by a factor; where a name of its parameters is taken, that one is numbered."""
+    """Multiply the rates of all terms by a factor, of further states if it has some.
+
+    Where a name of its parameters is taken, that one is numbered.
+    """
     taken = set(law.names)
     names = {symbol: Symbol(unused_name(symbol.name, taken)) for symbol in params}
     return replace(
@@ -400,6 +404,7 @@ def multiplied(
         name=f"{law.name}*{name or title.replace(' ', '-')}",
         title=f"{law.title or law.name} {'and' if ' with ' in law.title else 'with'} {title}",
         terms={label: term * factor.xreplace(names) for label, term in law.terms.items()},
+        states={**law.states, **{z: replace(one, rate=one.rate.xreplace(names)) for z, one in (states or {}).items()}},
         params={**law.params, **{names[symbol]: param for symbol, param in params.items()}},
         references=tuple(dict.fromkeys((*law.references, reference))),
         examples=(),

@@ -3,11 +3,13 @@
     sentence    = product [+ product [+ product]], [times Arrhenius' factor, of all or of each]
     product     = stress [* hardening] [* softening]
     stress      = power | sinh | exponential | threshold | double power
-    hardening   = strain power | time power | strain saturation | time saturation
-    softening   = softening in strain
+    hardening   = strain power | time power | strain saturation | time saturation | back stress, that recovers
+    softening   = softening in strain | damage, that grows with time under stress
 
 Every sentence is an ordinary law, made by the algebra of laws. By construction no rate is negative, each grows with
-stress and vanishes without, and strain is finite from time zero on: the exponents of strain and time lie above -1.
+stress and vanishes without, and strain is finite from time zero on: the exponents of strain and time lie above -1. A
+material has one damage, so that one product of a sum has it, and one back stress, which hardens by all strain, so that
+a product with it stands alone.
 """
 
 from __future__ import annotations
@@ -15,10 +17,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product, starmap
 
 import sympy
 
-from creepkit.language import CreepLaw, Param, arrhenius, parameters, strain, stress, time
+from creepkit.language import CreepLaw, Param, State, arrhenius, parameters, states, strain, stress, time
 from creepkit.language.algebra import multiplied
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -29,7 +32,8 @@ MOST_PRODUCTS = 3
 """Of a sum."""
 
 
-A, B, Omega, b, n, p, s_0, s_b, t_p = parameters("A B Omega b n p s_0 s_b t_p")
+A, B, D, H, Omega, b, chi, n, p, q, r, s_0, s_b, t_p = parameters("A B D H Omega b chi n p q r s_0 s_b t_p")
+v, X = states("v X")
 
 
 _RATE, _EXPONENT = (NORTON.params[NORTON.symbol(name)] for name in ("A", "n"))
@@ -77,10 +81,14 @@ STRESS: Mapping[str, CreepLaw] = {
 """Stress functions, as laws of steady creep."""
 
 
-HARDENING = ("none", "strain power", "time power", "strain saturation", "time saturation")
+HARDENING = ("none", "strain power", "time power", "strain saturation", "time saturation", "back stress")
 
 
-SOFTENING = ("none", "strain")
+SOFTENING = ("none", "strain", "damage")
+
+
+WITH_BACK_STRESS = ("power", "double power")
+"""Stress functions that a back stress may stand in: a threshold is one that is constant."""
 
 
 TEMPERATURE = ("none", "arrhenius", "arrhenius of each")
@@ -93,6 +101,21 @@ class Product:
     stress: str = "power"
     hardening: str = "none"
     softening: str = "none"
+
+    @classmethod
+    def all(cls) -> list[Product]:
+        """Every product of the grammar."""
+        return [one for one in starmap(cls, product(STRESS, HARDENING, SOFTENING)) if one.allowed]
+
+    @property
+    def factors(self) -> int:
+        """How many stand beside the stress function."""
+        return (self.hardening != "none") + (self.softening != "none")
+
+    @property
+    def allowed(self) -> bool:
+        """Whether the factors may stand together."""
+        return self.hardening != "back stress" or self.stress in WITH_BACK_STRESS
 
     @property
     def law(self) -> CreepLaw:
@@ -129,16 +152,23 @@ class Sentence:
         if len(self.products) < MOST_PRODUCTS:
             changed |= dict.fromkeys((*self.products, Product("power", name)) for name in HARDENING)
         for products in changed:
-            if len(set(products)) == len(products):  # a sum of two alike is one of them, or a double power
+            if allowed(products):
                 yield replace(self, products=products)
         for name in temperatures:
             if name != self.temperature and not (name == "arrhenius of each" and len(self.products) == 1):
                 yield replace(self, temperature=name)
 
 
+def allowed(products: Sequence[Product]) -> bool:
+    """Whether products may be a sum: two alike are one of them, or a double power; a material has one damage."""
+    several = len(products) > 1 and any(one.hardening == "back stress" for one in products)
+    once = len(set(products)) == len(products) and sum(one.softening == "damage" for one in products) < 2
+    return once and not several and all(one.allowed for one in products)
+
+
 @cache
 def _law_of_sentence(sentence: Sentence) -> CreepLaw:
-    laws = [product.law for product in sentence.products]
+    laws = [one.law for one in sentence.products]
     if sentence.temperature == "arrhenius of each":
         laws = [law.times(arrhenius(sentence.T_ref)) for law in laws]
     law = sum(laws[1:], laws[0])
@@ -146,30 +176,59 @@ def _law_of_sentence(sentence: Sentence) -> CreepLaw:
 
 
 @cache
-def _law_of_product(product: Product) -> CreepLaw:
+def _law_of_product(of: Product) -> CreepLaw:
     """Those that are built in have their names; a factor that is none of theirs is named behind the stress function."""
-    law = STRESS[product.stress]
+    law = STRESS[of.stress]
     built_in = {"strain power": STRAIN_HARDENING, "time power": TIME_HARDENING}
-    if product.hardening == "strain saturation":
+    if of.hardening == "strain saturation":
         law = law.with_primary()
-    elif product.stress == "power" and product.hardening in built_in:
-        law = built_in[product.hardening]
-    elif product.hardening in built_in:
-        other = built_in[product.hardening]
+    elif of.stress == "power" and of.hardening in built_in:
+        law = built_in[of.hardening]
+    elif of.hardening in built_in:
+        other = built_in[of.hardening]
         m = other.symbol("m")
-        variable = strain if product.hardening == "strain power" else time
-        law = multiplied(law, product.hardening, variable**m, {m: other.params[m]}, other.references[0])
-    elif product.hardening == "time saturation":
+        variable = strain if of.hardening == "strain power" else time
+        law = multiplied(law, of.hardening, variable**m, {m: other.params[m]}, other.references[0])
+    elif of.hardening == "time saturation":
         table = {
             b: Param("initial over steady rate, less one", bounds=(0.1, 300.0), scale="log", unit="1"),
             t_p: Param("time over which primary creep fades", bounds=(1e2, 1e8), scale="log", unit="s"),
         }
         reference = "Andrade (1910), Proc. R. Soc. A 84, 1; Garofalo (1965), Fundamentals of Creep"
-        law = multiplied(law, product.hardening, 1 + b * sympy.exp(-time / t_p), table, reference)
-    if product.softening == "strain":
+        law = multiplied(law, of.hardening, 1 + b * sympy.exp(-time / t_p), table, reference)
+    elif of.hardening == "back stress":
+        source = "Bailey (1926), J. Inst. Metals 35, 27; Orowan (1946), J. West Scotl. Iron Steel Inst. 54, 45"
+        terms = {label: term.xreplace({stress: sympy.Max(stress - X, 0)}) for label, term in law.terms.items()}
+        law = replace(
+            law,
+            name=f"{law.name}*back-stress",
+            title=f"{law.title} with back stress",
+            terms=terms,
+            states={X: State(0.0, H * sympy.Add(*terms.values()) - r * X, "back stress", "MPa")},
+            params={
+                **law.params,
+                H: Param("hardening by strain", bounds=(1e2, 1e6), scale="log", unit="MPa"),
+                r: Param("rate of recovery", bounds=(1e-12, 1e-2), scale="log", unit="1/s"),
+            },
+            references=(*law.references, source),
+            examples=(),
+        )
+    if of.softening == "strain":
         table = {Omega: Param("acceleration by strain", unit="1", bounds=(0.5, 500.0), scale="log")}
         reference = "Prager (1995), J. Pressure Vessel Technol. 117, 95"
         law = multiplied(law, "softening", sympy.exp(Omega * strain), table, reference)
+    elif of.softening == "damage":
+        table = {
+            D: Param("rate coefficient of damage", unit="1/s", bounds=(1e-60, 1e-3), scale="log"),
+            chi: Param("stress exponent of damage", bounds=(1.0, 20.0)),
+            q: Param("exponent of the rest of life", bounds=(0.05, 5.0)),
+        }
+        reference = "Kachanov (1958), Izv. Akad. Nauk SSSR, Otd. Tekh. Nauk 8, 26; Rabotnov (1969)"
+        life = State(0.0, D * stress**chi, "share of life spent", limit=1 - 1e-8)
+        law = multiplied(law, "damage", (1 - v) ** -q, table, reference, states={v: life})
+        if X in law.states:  # what damage speeds up hardens too
+            hardening = H * sympy.Add(*law.terms.values())
+            law = replace(law, states={**law.states, X: replace(law.states[X], rate=hardening - r * X)})
     return law
 
 

@@ -1,9 +1,9 @@
 """search_laws: sentences are proposed, changed one factor at a time, fitted in full, and ranked beside registered laws.
 
-1. Rates of smoothed curves propose: all products, those of a sparse regression, and sums that another one keeps.
-2. A beam of the best, by the criterion of a quick identification from the curves, is changed: of each sentence's
-   neighbours those that fit the smoothed rates best are identified in turn, until no change helps or the budget is
-   spent.
+1. All products are fitted to rates of smoothed curves; sparse regression says which of them to add. A beam of the best
+   is changed, one factor at a time, until no change helps on those rates.
+2. The best, and the best of each number of parameters, are identified from the curves; of the best of these the changes
+   are tried too.
 3. The sentences on the front and near the best, and the registered laws that suit the tests, are identified and
    ranked as by select().
 """
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from time import process_time
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -33,8 +32,8 @@ from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.selection.select import as_shown
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
-from creepkit.law_search.grammar import HARDENING, SOFTENING, STRESS, Product, Sentence
-from creepkit.law_search.proposals import proposed_products, proposed_sums
+from creepkit.law_search.grammar import Product, Sentence, allowed
+from creepkit.law_search.proposals import proposed_sums
 from creepkit.law_search.results import LawSearch, SearchedLaw
 from creepkit.law_search.smoothed_rates import RateFit, SmoothedRates
 from creepkit.limits import Limits
@@ -45,11 +44,15 @@ from creepkit.registry.arguments import resolve_predictors
 if TYPE_CHECKING:
     from creepkit.option_keywords import LawSearchOptionsKeywords
 
-BEAM, TRIED, SIMPLER = 3, 5, 2
-"""Sentences that are changed in turn, and neighbours of each that are identified, and of those with less parameters."""
+BEAM, TRIED = 4, 6
+"""Sentences that are changed in turn, and best ones on the smoothed rates that are identified from the curves."""
 
 
-MOST_RANKED, NEAR, REGISTERED_RANKED = 4, 20.0, 2
+SHARE_OF_SCREEN = 0.75
+"""Of the time of trying, for changes that smoothed rates judge."""
+
+
+MOST_RANKED, NEAR, REGISTERED_RANKED = 4, 20.0, 1
 """Sentences that are ranked at the end, their criterion above the least up to which they are, and registered laws."""
 
 
@@ -155,6 +158,7 @@ class _Search:
     fits: dict[Sentence | str, Identification] = field(default_factory=dict)
     failed: dict[Sentence | str, str] = field(default_factory=dict)
     registered: list[Sentence | str] = field(default_factory=list)
+    expanded: set[Sentence] = field(default_factory=set)
     untried: int = 0
 
     def run(self, optimizer: Any) -> None:
@@ -163,32 +167,54 @@ class _Search:
         several = spans_temperatures(self.tests)
         self.temperatures = ("arrhenius", "arrhenius of each") if several else ("none",)
         first = Sentence((), self.temperatures[0], reference_temperature(self.tests))
-        singles = [Product(*factors) for factors in product(STRESS, HARDENING, SOFTENING)]
-        singles = list(dict.fromkeys([*proposed_products(self.rates, optimizer), *singles]))
-        self.screen([replace(first, products=(one,)) for one in singles])
-        by_screen = sorted(self.screened, key=self.screen_score)
-        fitted = {one.products[0]: self.screened[one].log_rate for one in by_screen[: 3 * BEAM]}
-        sums = [replace(first, products=products) for products in proposed_sums(self.rates, fitted, optimizer)]
-        self.screen(sums)
-        self.identify([*by_screen[: BEAM + TRIED], *sums])
-        expanded = set[Sentence]()
-        while self.fits and process_time() < self.end:
-            chosen = next((one for one in self.best(BEAM) if one not in expanded), None)
-            if chosen is None:
-                break
-            expanded.add(chosen)
-            near = [one for one in chosen.neighbours(self.temperatures) if one not in self.fits]
-            self.screen(near)
-            near = sorted((one for one in near if one in self.screened), key=self.screen_score)
-            simpler = [one for one in near if len(one.law.params) < len(chosen.law.params)]
-            self.identify([*near[:TRIED], *simpler[:SIMPLER]])
-        self.untried = sum(one not in expanded for one in self.best(BEAM))
+        self.screen([replace(first, products=(one,)) for one in Product.all() if one.factors < 2])
+        fitted = {one.products[0]: self.screened[one].log_rate for one in self.by_screen()[: 4 * BEAM]}
+        self.screen(
+            [replace(first, products=one) for one in proposed_sums(self.rates, fitted, optimizer) if allowed(one)]
+        )
+        end, self.end = self.end, process_time() + SHARE_OF_SCREEN * (self.end - process_time())
+        self.expand(lambda: self.by_screen()[:BEAM])
+        self.end = end
+        self.identify(self.simpler())
+        self.identify(self.by_screen()[:TRIED])
+        while self.fits and process_time() < self.end and self.expand(lambda: self.best(BEAM), 1):
+            least = self.screen_score(self.by_screen()[0])
+            self.identify([one for one in self.by_screen()[: 2 * TRIED] if self.screen_score(one) < least + NEAR])
+        self.untried = sum(one not in self.expanded for one in self.best(BEAM))
         self.identify_registered()
 
-    def screen(self, sentences: Sequence[Sentence]) -> None:
-        """Fit sentences to the smoothed rates."""
+    def expand(self, beam: Callable[[], list[Sentence]], most: int = 1000) -> int:
+        """Screen the neighbours of sentences of a beam, one after the other; returns of how many."""
+        count = 0
+        while count < most and process_time() < self.end:
+            chosen = next((one for one in beam() if one not in self.expanded), None)
+            if chosen is None:
+                break
+            near, count = self.screened[chosen], count + 1
+            for one in chosen.neighbours(self.temperatures):
+                self.screen([one], near)
+                if one in self.screened and self.screen_score(one) < near.score - NEAR:
+                    break  # to go on from there; the rest when it is the best again
+            else:
+                self.expanded.add(chosen)
+        return count
+
+    def by_screen(self) -> list[Sentence]:
+        """The sentences screened, the least criterion first."""
+        return sorted(self.screened, key=self.screen_score)
+
+    def simpler(self) -> list[Sentence]:
+        """The sentences of which none of fewer parameters is better on smoothed rates, the simplest first."""
+        found, least = list[Sentence](), 10**6
+        for one in self.by_screen():
+            if len(one.law.params) < least:
+                found, least = [one, *found], len(one.law.params)
+        return found
+
+    def screen(self, sentences: Sequence[Sentence], near: RateFit | None = None) -> None:
+        """Fit sentences to the smoothed rates, some starts from the values of a similar one."""
         for one in self._in_time([s for s in sentences if s not in self.screened], "smoothed rates"):
-            self.screened[one] = self.rates.fitted(one)
+            self.screened[one] = self.rates.fitted(one, near)
 
     def screen_score(self, sentence: Sentence) -> float:
         """The criterion of a sentence on the smoothed rates."""

@@ -77,7 +77,7 @@ def _table(ranking: Ranking) -> Table:
             str(len(one.fit.law.params)),
             ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
             scatter_of_rates(one.fit),
-            number(one.excess, 3),
+            number(one.excess, 3) if math.isfinite(one.excess) else "–",
             f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
             "?" if one.fit.adequacy is None else one.fit.adequacy.verdict_text,
