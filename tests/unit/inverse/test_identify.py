@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import creepkit as ck
 from creepkit.errors import FitError, FitWarning
@@ -321,6 +322,22 @@ def test_rates_over_a_threshold_stress_bend_down_at_each_temperature_those_of_tw
     assert named(0.0, 140.0**4) == ["norton", "hyperbolic-sine", "double-power"]
     forms = ck.law("threshold-stress").with_temperature(s_0=ck.linear(T_ref=843.15))
     assert ck.law(falling).fingerprint == forms.times(ck.arrhenius(T_ref=843.15)).fingerprint
+
+
+def test_damage_with_primary_creep_follows_an_integration_of_its_equations():
+    """Kachanov-Rabotnov without hardening by time, its strain rate times 1 + b exp(-e/e_p), by scipy under a load."""
+    values = {"A": 1e-21, "n": 6.0, "B": 1e-21, "chi": 6.5, "phi": 5.0, "alpha": 0.0, "b": 8.0, "e_p": 0.002}
+
+    def rates(_, y):
+        stress = 100.0 * np.exp(y[0])
+        steady = 1e-21 * (stress / (1.0 - y[1]) ** (1.0 / 6.0)) ** 6
+        return steady * (1.0 + 8.0 * np.exp(-y[0] / 0.002)), 1e-21 * stress**6.5
+
+    times = np.linspace(0.0, 5e7, 9)[1:]
+    found = solve_ivp(rates, (0.0, 5e7), (0.0, 0.0), method="LSODA", t_eval=times, rtol=1e-10, atol=1e-12)
+    run = ck.simulate("kachanov-rabotnov*primary", "uniaxial", values, times=times, loading=ck.constant_stress(100.0))
+    assert found.y[1, -1] > 0.3
+    np.testing.assert_allclose(run.outputs["strain"], found.y[0], rtol=2e-3)
 
 
 def test_a_name_with_primary_creep_is_the_law_itself_with_the_factor():

@@ -283,6 +283,17 @@ def test_a_guess_gives_way_to_an_answer(tmp_path):
         ck.read_histories(tmp_path / "k.csv")
 
 
+def test_one_answer_for_tests_whose_titles_differ_is_refused(tmp_path):
+    frames = "Time (h);Strain (%)\n0;0\n10;0.1\n"
+    frames = f"Température d’essai (°C);245\n{frames}"
+    written(tmp_path, two__csv=f"Test A 12 MPa\n{frames}\nTest B 20 MPa\n{frames}")
+    found = ck.read_histories(tmp_path / "two.csv")
+    assert [(one.temperature, one.loading.steps[0][1]) for one in found] == [(518.15, 12.0), (518.15, 20.0)]
+    written(tmp_path, tests__toml='["*.csv"]\nstress_MPa = 15\n')
+    with pytest.raises(HistoryError, match="15 would hold for all tests of 'two.csv', which say 12 MPa and 20 MPa"):
+        ck.read_histories(tmp_path / "two.csv")
+
+
 TREATMENTS = (
     *("lot A, reflow 245C", "aged 1000 h at 750 °C", "annealed 980 C", "heat treated 1050 °C", "solution 1180 °C"),
     *("tempered 770 °C", "normalised 1060 °C", "cured 180 C", "HT 1050 °C", "geglüht 900 °C", "ausgelagert 750 °C"),

@@ -14,7 +14,14 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.perturbation_trials import Challenge
-from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores
+from creepkit.inverse.selection.ranking import (
+    RankedLaw,
+    Ranking,
+    _are_outdone,
+    challenged,
+    rank,
+    ranking_from_scores,
+)
 from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import LinearisedProblem
@@ -167,6 +174,24 @@ def test_a_truth_outside_the_set_is_flagged_and_never_decisive(seed):
     assert not ranking.decisive
     assert ranking.further == ()
     assert ranking.verdict.startswith("not decisive: none of 4 laws tried explains the tests; the best, ")
+
+
+def test_a_best_law_with_damage_is_tried_with_primary_creep_and_in_no_sum_with_another_damage():
+    richer = _richer_laws(tried(LEAVES, LEAVES, LEAVES, laws=("kachanov-rabotnov", "sinh-damage", "norton")), [])
+    assert [law.name for law in richer[:2]] == ["kachanov-rabotnov*primary", "kachanov-rabotnov+norton"]
+    assert "kachanov-rabotnov+sinh-damage" not in {law.name for law in richer}
+
+
+def test_a_contradicted_law_that_nobody_asked_for_has_to_predict_tests_better():
+    """By ln rate 0.1 and 0.4 for the 0.2 of the one that was asked for."""
+    names, errors = ("asked", "better", "worse"), (0.2, 0.1, 0.4)
+    fits = [
+        SimpleNamespace(law=SimpleNamespace(name=name), adequacy=LEAVES, prediction_error=error)
+        for name, error in zip(names, errors, strict=True)
+    ]
+    assert _are_outdone(fits, ("better", "worse")) == [False, False, True]
+    fits[2].adequacy = replace(LEAVES, verdict="explains")
+    assert _are_outdone(fits, ("better", "worse")) == [False, False, False]
 
 
 def test_further_laws_are_tried_within_their_budget_and_are_proposals():
