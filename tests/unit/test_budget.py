@@ -40,7 +40,7 @@ BUDGET = {
     "readers": 6066,
     "records": 2345,
     "registry": 608,
-    "reports": 5724,
+    "reports": 5729,
     "rupture_assessment": 1841,
     "sampling": 960,
     "screening": 547,
