@@ -368,9 +368,8 @@ def _caution(laws: Sequence[LawDraws]) -> str:
             outside = f"{100 * draws.outside:.0f} % of them"
             names = ", ".join(open_)
             return (
-                f"the band is not that of the tests, and what parameters add to it may be far too wide: tests do not, "
-                f"or poorly, determine {names}, and its draws are Gaussian about the values, not compared with "
-                f"the tests; {outside} lay outside the bounds of the law and were left out"
+                f"the band may be far too wide: the tests do not, or poorly, determine {names}. Its draws are Gaussian "
+                f"about the values, not compared with the tests; {outside} lay outside the bounds of the law"
             )
     return ""
 

@@ -106,7 +106,7 @@ The dense output is the one quartic that meets the conditions of order 3, and of
 
 SDIRK4_TEXT = (
     "an L-stable singly diagonally implicit Runge-Kutta method of five stages and order 4, with one of order 3 "
-    "embedded; see Hairer and Wanner, Solving Ordinary Differential Equations II, IV.6"
+    "embedded. See Hairer and Wanner, Solving Ordinary Differential Equations II, IV.6"
 )
 """SDIRK4 in words."""
 

@@ -52,8 +52,7 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     minimum rates prefer them a threshold stress, constant or linear in temperature, or a sum of two powers, each with
     an activation energy; with primary creep where a third of the curves show it, with and without where a third relax,
     and logarithmic creep where a third of them go with ln t, else beside hardening by strain and by time. Where a third
-    of the curves show tertiary creep, or where a table states rupture times, laws with damage are added, with primary
-    creep where the curves show both.
+    of the curves show tertiary creep, or where a table states rupture times, laws with damage are added.
     """
     return list(named_candidates(histories).values())
 
@@ -71,10 +70,7 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
         ruptures = sum(h.rupture_time is not None for h in tests if not h.outputs) >= FEWEST_RUPTURES
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
     elif _share(curves, shows_tertiary_creep) > SHARE:
-        softening = ["kachanov-rabotnov", *(["sinh-damage"] if several else [])]
-        if _share(_strained(curves), shows_primary_creep) > SHARE:
-            softening = ["kachanov-rabotnov", *(f"{name}*primary" for name in softening)]
-        names = [*steady[:1], *steady[2:], "mpc-omega", *softening]
+        names = [*steady[:1], *steady[2:], "mpc-omega", "kachanov-rabotnov", *(["sinh-damage"] if several else [])]
     elif _share(curves, _relaxes) > SHARE:
         names = [*steady, *(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
     elif _share(_strained(curves), shows_primary_creep) > SHARE:

@@ -59,7 +59,7 @@ from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import perturbations
+from creepkit.inverse.perturbations import perturbations, with_derivatives_to_lengths
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
@@ -309,6 +309,7 @@ def _last_estimate(
         limits = limits._replace(rounds=REFIT_ROUNDS)
         if problem.predictor.refined() is None:
             return best, None
+    problem = with_derivatives_to_lengths(problem)  # which errors of tests need where it ends
     for _ in range(MOST_CORRECTIONS):
         corrected, error = correct_defect(problem, x)
         if (
@@ -466,7 +467,7 @@ def _reported(
         histories=tuple(histories),
         predictor=problem.predictor,
         linearised=linear,
-        problem=problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model)),
+        problem=replace(problem, lengths={}).with_covariance(CovarianceFactor.of_residuals(residuals, noise_model)),
     )
 
 

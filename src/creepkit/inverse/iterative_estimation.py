@@ -36,8 +36,9 @@ LIKELIHOOD_TOLERANCE = 1e-5
 and above what the steps of a solver leave."""
 
 
-MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS = 10, 0.02, 4
-"""Last steps of values by likelihood, the largest one left out, in standard deviations, and halvings of each."""
+MOST_LAST_STEPS, LAST_STEP, MOST_HALVINGS, SHRINKS = 10, 0.05, 4, 0.8
+"""Last steps of values by likelihood, the largest one left out, in standard deviations, halvings of each, and its size
+over that of the step before from which on values go to and fro, as in a valley along which the errors of tests turn."""
 
 
 DOUBTFUL_STEP = 0.5
@@ -154,7 +155,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
     errors and residuals made linear at each.
     """
     problem, linear, noise = with_derivatives_to_lengths(found.problem), found.linear, found.noise
-    free, first, left = linear.free, None, 0.0
+    free, first, left = linear.free, None, np.inf
     for _ in range(MOST_LAST_STEPS):
         expected = with_expected_scatter(problem, linear, noise)
         problem, residuals = about_own_rates(problem, linear.x, linear.residuals, expected)
@@ -165,8 +166,8 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
         found = replace(found, problem=replace(problem, lengths={}), linear=linear, errors=errors)
         first = first or found
-        problem, linear, left = _stepped(problem, linear, factor, expected, LAST_STEP)
-        if left <= LAST_STEP or linear is found.linear:
+        before, (problem, linear, left) = left, _stepped(problem, linear, factor, expected, LAST_STEP)
+        if left <= LAST_STEP or linear is found.linear or SHRINKS * before < left < DOUBTFUL_STEP:
             break
     # values that steps drive to and fro are those that they began with
     return replace(found, converged=True) if first is None or left < DOUBTFUL_STEP else replace(first, converged=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import end_figures, event_text
-from creepkit.reports.blocks import Block, Items, Paragraph, as_text
+from creepkit.reports.blocks import WIDTH, Block, Items, Paragraph, as_text
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
@@ -37,7 +38,8 @@ SHOWN_SHARE = 0.02
 
 def forecast_text(forecast: Forecast) -> str:
     """What is forecast by which laws, then each test."""
-    return as_text(forecast_blocks(forecast))
+    lines = as_text(forecast_blocks(forecast)).splitlines()
+    return "\n".join(line for text in lines for line in wrap(text, WIDTH, subsequent_indent="  "))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -83,8 +85,8 @@ def misfit_sentence(misfit: LawMisfit) -> str:
     factor = math.exp(abs(misfit.log_factor))
     where = f"{misfit.stress:.4g} MPa and {celsius_text(misfit.temperature, digits=0)}"
     return (
-        f"when the others predict them, the law misses the rate of the nearest tests, at {where}, by a factor of "
-        f"{factor:.3g}; what it misses here is in the intervals, as a factor of {misfit.factor:.3g} on the rate"
+        f"it misses the rate of the nearest tests, at {where}, by a factor of {factor:.3g} where others predict them. "
+        f"Intervals hold what it misses here, a factor of {misfit.factor:.3g} on the rate"
     )
 
 

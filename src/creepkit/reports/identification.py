@@ -345,9 +345,8 @@ def noise_blocks(fit: Identification) -> list[Block]:
     if rows:
         columns = ("output", "unit", "of a reading", "in the fit", "offset of a test", "rms misfit", "squared error")
         caption = (
-            "noise as it was estimated, one standard deviation: of a reading from what its test states or its "
-            "neighbouring readings show, by which the law is judged; one for all in the weights of the fit; and what "
-            "the law leaves of all readings, with the relative squared error"
+            "noise as it was estimated, one standard deviation. Of a reading: by which the law is judged, from what "
+            "its test states or its neighbours show. In the fit: one for all. Misfit and error: what the law leaves"
         )
         blocks.append(Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6)))
     unknown = {n.kind for n in fit.settings.nuisances if n.sd is None}
@@ -422,8 +421,8 @@ def _correlations(fit: Identification) -> list[Block]:
     k, j = np.unravel_index(int(size.argmax()), size.shape)
     together = (
         f"{names[k]} and {names[j]} have a correlation of {number(float(matrix[k, j]), 4)}: their values hold together "
-        "only. Rounding one of them, or taking it from elsewhere, changes the creep rate by far more than its "
-        "interval; carry all digits, and take uncertainties of rates from the covariance, which is among the files"
+        "only. Rounding one of them changes the creep rate by far more than its interval. Carry all digits, and take "
+        "uncertainties of rates from the covariance, which is among the files"
     )
     return [table, Paragraph(together, "warning")]
 

@@ -32,7 +32,8 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     if adequacy is not None and adequacy.rejects:
         if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])
-        return NEXT["laws" if len(laws) < 2 else "search laws" if _are_bars(fit) and not searched else "within"]
+        kind = "laws" if len(laws) < 2 else "search laws" if _are_bars(fit) else "within"
+        return NEXT["within" if searched else kind]
     if adequacy is not None and adequacy.verdict == "cannot be judged" and adequacy.not_judged != (RUPTURE_OUTPUT,):
         stated = [one for one in adequacy.not_judged if one != RUPTURE_OUTPUT] or ["strain"]
         unit = "_1/s" if stated[0] == MINIMUM_RATE_OUTPUT else ""

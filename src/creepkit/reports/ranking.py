@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
 
 CHI_SQUARE_NOTE = (
-    "chi-square: of all values under one estimated covariance, by which laws are compared; the reduced chi-square of a "
-    "verdict is that over the noise of the readings alone"
+    "chi-square is that of all values under one estimated covariance, by which laws are compared. The reduced "
+    "chi-square of a verdict is that over the noise of the readings alone"
 )
 
 
@@ -77,7 +77,7 @@ def _table(ranking: Ranking) -> Table:
             str(len(one.fit.law.params)),
             ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
             scatter_of_rates(one.fit),
-            number(one.excess, 3),
+            number(one.excess, 3) if math.isfinite(one.excess) else "–",
             f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
             number(one.chi_square, 4),
             "?" if one.fit.adequacy is None else one.fit.adequacy.verdict_text,

@@ -157,7 +157,7 @@ def _identification(summary: DataSummary) -> dict[str, Any]:
     return {
         "laws": laws,
         "damage": damage,
-        "damage_of_tension": {name.removesuffix("*primary") for name in damage} <= {"kachanov-rabotnov", "sinh-damage"},
+        "damage_of_tension": damage <= {"kachanov-rabotnov", "sinh-damage"},
         "reduced": [name for name, one in reduced_order_models().items() if {one.name} == specimens],
         "lengths": [length for length in lengths if length.tolerance > 0][:1],
         "longer": longer,

@@ -231,7 +231,7 @@ def test_over_laws_the_doubt_about_the_law_is_part_of_the_band(tests):
     far = bar("plan", 220.0, noise=0.0)
     of_one, of_both = fits[0].forecast(far), average.forecast(far)
     assert "single tests, if the law is right" in str(of_one)
-    assert "single tests, if one of these laws is right, with these weights" in str(of_both)
+    assert "single tests, if one of these laws is right, with these weights" in " ".join(str(of_both).split())
     single, both = of_one.tests[0], of_both.tests[0]
     assert both.outputs["strain"].shares["choice of the law"][-1] > 0.05
     width = [np.log(t.times[0].high / t.times[0].low) for t in (single, both)]

@@ -7,7 +7,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.reports.answer import table_of_groups
-from creepkit.reports.next_steps import further_test, law_to_try
+from creepkit.reports.next_steps import LACKING, further_test, law_to_try, next_step
+from creepkit.reports.words import NEXT
 
 STRESSES = np.array([80.0, 110.0, 150.0, 200.0])
 AMID = float(np.exp(np.log(STRESSES).mean()))
@@ -33,6 +34,8 @@ def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
     early = ck.identify("norton", bars(lambda x: x + 0.5 * (1 - np.exp(-10 * x))))
     assert law_to_try(early, []) == ("norton*primary", "early")
     assert law_to_try(early, ["norton*primary"]) == ("strain-hardening", "early")
+    assert "norton between the tests only, for " in early.headline
+    assert next_step(early, searched=[one.format(law="norton") for one in LACKING["early"]]) == NEXT["within"]
     late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
     assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")
 

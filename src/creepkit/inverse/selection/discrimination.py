@@ -20,7 +20,7 @@ of one another, is no other answer: the simpler law, where it has more evidence,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -29,7 +29,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
+from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.perturbation import Perturbation
@@ -186,10 +186,11 @@ class RatesOverTests:
 
     def __init__(self, fits: Sequence[Identification]) -> None:
         self.fits = fits
-        known = [bool(f.histories) and f.predictor is not None and not (f.law.states or f.law.conditions) for f in fits]
-        self.rates = [
-            TermContributions.of_problem(fit.least_squares_problem) if is_known else None
-            for fit, is_known in zip(fits, known, strict=True)
+        self.log_rates: list[Callable[[Floats], Floats]] = [
+            TermContributions.of_problem(fit.least_squares_problem).log_rate
+            if fit.histories and fit.predictor is not None and not (fit.law.states or fit.law.conditions)
+            else lambda _: np.array([np.nan])
+            for fit in fits
         ]
 
     def standing(self, u: Sequence[Floats], scores: Floats) -> list[int]:
@@ -197,20 +198,13 @@ class RatesOverTests:
 
         u : (parameters,) conditioned coordinates of each. scores : (laws,) -2 ln of the evidence.
         """
-        log_rates = [
-            np.array([np.nan]) if rates is None else rates.log_rate(own)
-            for rates, own in zip(self.rates, u, strict=True)
-        ]
+        log_rates = [log_rate(own) for log_rate, own in zip(self.log_rates, u, strict=True)]
         sizes, stands = [fit.u.size for fit in self.fits], list(range(len(self.fits)))
         for k in sorted(stands, key=lambda law: sizes[law]):
             simpler = [j for j, size in enumerate(sizes) if size < sizes[k] and scores[j] <= scores[k]]
             same = [j for j in simpler if same_function(log_rates[j], log_rates[k])]
             stands[k] = stands[min(same, key=lambda law: float(scores[law]), default=k)]
         return stands
-
-    def weights(self, standing: Sequence[int], scores: Floats) -> Floats:
-        """(laws,) weights by scores (laws,), those of laws for which another one stands with it."""
-        return np.asarray(np.bincount(standing, criterion_weights(scores)[1], len(standing)), float)
 
 
 DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))

@@ -20,7 +20,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
@@ -141,7 +141,8 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     challenges: dict[str, tuple[float, Challenge]] = {}
     rates = RatesOverTests(fits)
     for trial in _trials(fits):
-        weights = rates.weights(rates.standing(trial.u, trial.scores), trial.scores)
+        own = criterion_weights(trial.scores)[1]
+        weights = np.bincount(rates.standing(trial.u, trial.scores), own, len(fits))
         effect, weight = trial.effects[0], float(weights[0])
         if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
             continue

@@ -320,7 +320,7 @@ def ranking_from_scores(
     scores = np.where(predicted, scores, np.inf) if predicted.any() else scores
     excess, weight = criterion_weights(scores)
     standing = [*range(len(fits))] if rates is None else rates.standing([fit.u for fit in fits], scores)
-    weight = weight if rates is None else rates.weights(standing, scores)
+    weight = np.bincount(standing, weight, len(fits)).astype(float)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     names = [fits[law].law.name if law != k else "" for k, law in enumerate(standing)]

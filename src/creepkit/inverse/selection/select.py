@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
-from creepkit.errors import CreepkitError, FitError
+from creepkit.errors import CreepkitError, FitError, LawError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
@@ -114,6 +114,8 @@ def as_shown(fit: Identification, asked: IdentificationSettings, through: Predic
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
     """What is tried where no candidate explains the tests: laws that suit them, sums of the best one, then others.
 
+    A best law with damage is tried with primary creep first.
+
     Nothing where a candidate would explain them with an effect that is not modelled, or but for one test or for two
     groups of tests: that is the simpler explanation.
     """
@@ -123,6 +125,8 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
+    with suppress(LawError):  # of one with primary creep of its own
+        suited += [laws[0].with_primary()] * bool(laws[0].states)
     sums = [laws[0] + other for other in laws[1:] if not (laws[0].states and other.states)]  # a piece breaks once
     free = {name for law in laws for name in law.names}
     fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}

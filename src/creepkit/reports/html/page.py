@@ -95,8 +95,11 @@ def report_html(contents: ReportContents) -> str:
 
 
 def _summary(contents: ReportContents) -> str:
+    """How many tests, of one material under which conditions, and when they were identified."""
     tests = sum(len(one.histories) or len(one.fit.tests if one.fits else ()) for one in contents.groups)
     parts = [plural(tests, "test")] if tests else []
+    if len(contents.groups) == 1:
+        parts = [typeset(tests_text(one.fit)) for one in contents.identified] or parts
     if len(contents.groups) > 1:
         parts.append(plural(len(contents.groups), "material"))
     dates = sorted({str(one.fit.provenance.get("when", ""))[:10] for one in contents.identified} - {""})
@@ -174,7 +177,8 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
         asked += [figure for one in contents.rupture.values() for figure in rupture_figures(one)]
         files = files_to_download(contents)[:MOST_FILES]
-        blocks.append(group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files))
+        first = group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files)
+        blocks.append(dataclasses.replace(first, tests=first.tests * (len(contents.groups) > 1)))  # said in the title
     elif not found:
         failed = any(group.failure or group.result is not None for group in contents.groups)
         if contents.groups and (failed or not contents.rupture):
