@@ -80,7 +80,7 @@ BENCHMARKS = {
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "noise_correlation": Benchmark(4),
     "conditions": Benchmark(30),
-    "law_search": Benchmark(12, (("--laws", "14"),), short=("--laws", "1", "--budget", "10")),
+    "law_search": Benchmark(45, (("--laws", "13"),), short=("--laws", "1", "--budget", "10")),
     "rate_tables": Benchmark(20, needs=DATA),
     "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),
     "mutations": Benchmark(90, (("build/mutations.jsonl",),), "g++"),
