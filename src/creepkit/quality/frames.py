@@ -227,11 +227,11 @@ def outlier_frames(history: History) -> Iterator[QualityFlag]:
                 _isolated(residuals), np.abs(residuals) / np.maximum(_local_scale(residuals), sigma), 0.0
             )
             standardised[standardised <= OUTLIER_THRESHOLD * (1 + FEW_FRAMES_CORRECTION / frames.size)] = 0.0
-            for worst in np.flatnonzero(standardised):
-                kept = np.delete(frames, worst + 2)
-                left = _interpolation_residuals(history.times[kept], values[kept])[0][max(worst - 2, 0) : worst + 2]
-                if np.abs(left).max() > STEP_FRACTION * abs(residuals[worst]):
-                    standardised[worst] = 0.0  # its neighbour is off without it, too
+            for k in np.flatnonzero(standardised):
+                kept = np.delete(frames, k + 2)
+                left = _interpolation_residuals(history.times[kept], values[kept])[0][max(k - 2, 0) : k + 2]
+                if np.abs(left).max() > STEP_FRACTION * abs(residuals[k]):
+                    standardised[k] = 0.0  # its neighbour is off without it, too
             worst = int(np.argmax(standardised))
             if not standardised[worst]:
                 break
