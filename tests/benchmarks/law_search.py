@@ -44,7 +44,8 @@ def planted(seed: int) -> tuple[Sentence, dict[str, float], np.random.Generator]
     products: list[Product] = []
     while len(products) < count:
         factors = [str(rng.choice(list(names))) for names in (STRESS, HARDENING, SOFTENING)]
-        if allowed([*products, Product(*factors)]):
+        alone = count == 1 or "back stress" not in factors
+        if alone and allowed([*products, Product(*factors)]):
             products.append(Product(*factors))
     sentence = Sentence(tuple(products), "arrhenius", T_REF)
     level, shares = 10 ** rng.uniform(-7.3, -6.3), rng.dirichlet(np.full(count, 4.0))

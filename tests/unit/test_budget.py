@@ -33,7 +33,7 @@ BUDGET = {
     "jobs": 250,
     "kernels": 1690,
     "language": 1557,
-    "law_search": 998,
+    "law_search": 989,
     "laws": 140,
     "modules": 747,
     "quality": 1126,
@@ -45,7 +45,7 @@ BUDGET = {
     "sampling": 960,
     "screening": 547,
     "specimens": 3203,
-    "studies": 2768,
+    "studies": 2777,
     "surrogates": 1365,
     "testing": 1777,
 }

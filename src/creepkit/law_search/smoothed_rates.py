@@ -105,7 +105,8 @@ class SmoothedRates:
         laws = {product: _with_temperature(product, sentence) for product in sentence.products}
         parts = _Parts.of(laws, sentence.temperature == "arrhenius", sentence.T_ref)
         low, high = parts.bounds
-        draws = self._coefficients(parts, parts.draws(near, float(self.stress.min())))
+        draws = parts.with_values(self._lives(parts, parts.draws(float(self.stress.min()))), near)
+        draws = self._coefficients(parts, draws)
         scales, size = SCALES, self.log_rate.size
 
         def system(theta: Floats) -> tuple[Floats, Floats]:
@@ -200,15 +201,19 @@ class SmoothedRates:
             values = np.logaddexp.reduce(logs, axis=0) - self.log_rate
         return np.where(np.isfinite(values), values, UNDEFINED)
 
-    def _coefficients(self, parts: _Parts, draws: Floats) -> Floats:
-        """Draws, the coefficients of whose products are those of least squares of the rate, none below a share."""
+    def _lives(self, parts: _Parts, draws: Floats) -> Floats:
+        """Draws of damage whose life lasts as long as the tests, or up to twenty times."""
         for law, own in zip(parts.laws.values(), parts.columns, strict=True):
-            if v in law.states:  # of a life that lasts as long as the tests, or up to twenty times
+            if v in law.states:
                 values = dict(zip(law.names, np.moveaxis(draws[:, own], -1, 0)[..., None, None], strict=True))
                 column = own[law.names.index("D")]
                 spent = (self._log_life(values | {"D": np.zeros(1)}, parts.T_ref) + np.log(self.time)).max(axis=(1, 2))
                 low, high = parts.bounds[:, column]
                 draws[:, column] = -spent - 3.0 * (draws[:, column] - low) / (high - low)
+        return draws
+
+    def _coefficients(self, parts: _Parts, draws: Floats) -> Floats:
+        """Draws, the coefficients of whose products are those of least squares of the rate, none below a share."""
         shares = self._of_products(parts, draws) - self.log_rate
         shares = np.where(np.isfinite(shares), shares, -UNDEFINED)
         shift = np.median(shares, axis=-1)  # (products, draws)
@@ -280,22 +285,21 @@ class _Parts:
         rates = [own[0] for own in columns]  # the coefficient of a product is its first parameter
         return cls(laws, kernels, T_ref, columns, rates, bounds)
 
-    def draws(self, near: RateFit | None, least_stress: float) -> Floats:
-        """(draws, parameters); those of every other draw are, where it has them, of a similar sentence.
-
-        A stress whose scale is linear is drawn below the least one of the tests, MPa.
-        """
+    def draws(self, least_stress: float) -> Floats:
+        """(draws, parameters); a stress whose scale is linear is drawn below the least one of the tests, MPa."""
         low, high = self.bounds.copy()
         for law, own in zip(self.laws.values(), self.columns, strict=True):
             for param, column in zip(law.params.values(), own, strict=True):
                 if param.unit == "MPa" and param.scale != "log":
                     high[column] = min(high[column], max(low[column], least_stress))
-        draws = np.asarray(low + qmc.Sobol(low.size, seed=0).random(DRAWS) * (high - low))
+        return np.asarray(low + qmc.Sobol(low.size, seed=0).random(DRAWS) * (high - low))
+
+    def with_values(self, draws: Floats, near: RateFit | None) -> Floats:
+        """Draws, every other one of which has the values of a similar sentence, where that has them."""
         for product, own in zip(self.laws, self.columns, strict=True):
-            if near is not None:
-                values = near.values_like(product)
-                for name, column in zip(self.laws[product].names, own, strict=True):
-                    draws[::2, column] = values.get(name, draws[::2, column])
+            values = {} if near is None else near.values_like(product)
+            for name, column in zip(self.laws[product].names, own, strict=True):
+                draws[::2, column] = values.get(name, draws[::2, column])
         return draws
 
     def by_product(self, theta: Floats) -> dict[Product, dict[str, float]]:

@@ -227,7 +227,7 @@ def outlier_frames(history: History) -> Iterator[QualityFlag]:
                 _isolated(residuals), np.abs(residuals) / np.maximum(_local_scale(residuals), sigma), 0.0
             )
             standardised[standardised <= OUTLIER_THRESHOLD * (1 + FEW_FRAMES_CORRECTION / frames.size)] = 0.0
-            for k in map(int, np.flatnonzero(standardised)):
+            for k in np.flatnonzero(standardised):
                 kept = np.delete(frames, k + 2)
                 left = _interpolation_residuals(history.times[kept], values[kept])[0][max(k - 2, 0) : k + 2]
                 if np.abs(left).max() > STEP_FRACTION * abs(residuals[k]):

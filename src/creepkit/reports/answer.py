@@ -204,9 +204,9 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     """
     found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
     hours = max((one.hours for one in found), default=0.0)
-    stated: list[Any] = [(f"time to rupture at {one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
-    stated += [(f"rupture strength at {hours:g} h", one.value, "MPa", one) for one in found if one.hours == hours]
-    return [_of_mean(*one) for one in stated]
+    lives = [_of_mean("time to rupture", f"{one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
+    at = f"{hours:g} h"
+    return [*lives, *(_of_mean("rupture strength", at, one.value, "MPa", one) for one in found if one.hours == hours)]
 
 
 def known_bounds(one: Any) -> tuple[float, float]:
@@ -217,10 +217,10 @@ def known_bounds(one: Any) -> tuple[float, float]:
     return (-math.inf if low is None else low), (math.inf if high is None else high)
 
 
-def _of_mean(name: str, value: float, unit: str, one: Any) -> KeyFigure:
+def _of_mean(name: str, at: str, value: Any, unit: str, one: Any) -> KeyFigure:
     low, high = known_bounds(one)
-    remark = f"mean of rupture methods{', extrapolated' * bool(one.extrapolation)}"
-    return KeyFigure(name, celsius_text(one.temperature, digits=0), value, low, high, unit, remark)
+    remark = f"mean of methods{', extrapolated' * bool(one.extrapolation)}"
+    return KeyFigure(name, f"{celsius_text(one.temperature, digits=0)}, {at}", value, low, high, unit, remark)
 
 
 # ---- cautions --------------------------------------------------------------------------------------------------------
@@ -364,7 +364,7 @@ def answer(
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
-    remarks += [chosen_text(ranking)] if ranking is not None and len(ranking.laws) > 1 else []
+    remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), ranking.same_functions]
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
@@ -415,14 +415,14 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
 
 def chosen_text(ranking: Ranking) -> str:
     """Whether the choice of the law is decisive, and the weights of the laws; cautions say why one is not."""
-    laws, same = [one for one in ranking.laws if not one.same_as], ranking.same_functions
+    laws = [one for one in ranking.laws if not one.same_as]
     known = [f"{one.fit.law.name} {one.weight:.2f}" for one in laws[:MOST_NAMED] if one.weight >= LEAST_WEIGHT]
     more = len(laws) - len(known)
     others = f"; {plural(more, 'other')} below {LEAST_WEIGHT:g}" if more else ""
     weights = f"weights: {', '.join(known)}{others}"
     if len(known) == 1:
         weights = f"weight {laws[0].weight:.2f} among {plural(len(laws), 'law')}"
-    return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}{same and f'; {same}'}"
+    return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}"
 
 
 # ---- laws ------------------------------------------------------------------------------------------------------------

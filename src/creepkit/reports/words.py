@@ -19,7 +19,7 @@ HEADLINES = {
 
 
 TRUTHS = {
-    "not judged": "whether it is the true law cannot be judged",
+    "not judged": "whether it is true cannot be judged",
     "explains": "the tests do not contradict it",
     "explained": "{cause}",
     "two exponents": "by it minimum rates contradict rupture times",

@@ -21,6 +21,7 @@ from creepkit.inverse.kept_fits import history_digest
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import elastic_of, temperature
+from creepkit.law_search.search import LawSearchOptions
 from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
@@ -143,6 +144,8 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         what = "compares laws by their likelihood: leave out weights and penalty"
         raise study.file.error(("selection",), what)
 
+    sought = None if model.law_search is None else values_of_table(LawSearchOptions, model.law_search)
+
     def make(results: Results, tick: Tick) -> Ranking:
         watched = [one for one in tests if "extraction" in one.labels and one.elastic is None]  # by cameras
         known = {name: one.conditions for name, one in known_specimens().items()}
@@ -150,13 +153,17 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         if needing:
             where = "modulus [GPa] of the table of alloys, or modulus_GPa of [[camera]]"
             raise StudyError(f"Young's modulus of {', '.join(needing[:30])} is not stated; write {where}")
-        compared = selection is not None
-        return ranked_candidates(laws, tests, using, asked, settings, compared=compared, progress=tick)
+        candidates = {law.fingerprint: law for law in laws}
+        if sought is not None:
+            searched = ck.search_laws(tests, using, settings=settings, progress=tick, **sought).ranking.laws
+            candidates = {one.fit.law.fingerprint: one.fit.law for one in searched} | candidates
+        compared, among = selection is not None, [*candidates.values()]
+        return ranked_candidates(among, tests, using, asked, settings, compared=compared, progress=tick)
 
     described = {
         "laws": [[law.name, law.fingerprint, [[n, *p.bounds, p.off] for n, p in law.table.items()]] for law in laws],
         "settings": record_to_json(asdict(settings)),
-        "how": [record_to_json(asdict(asked)), None if selection is None else selection.model_dump()],
+        "how": [record_to_json(asdict(asked)), None if selection is None else selection.model_dump(), sought],
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }

@@ -20,6 +20,7 @@ from creepkit.forecasts.planned_tests import ForecastOptions, PlannedTestOptions
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.inverse.candidate_laws import LawChanges, SearchOptions
 from creepkit.inverse.settings import IdentificationSettings, UsualErrors
+from creepkit.law_search.search import LawSearchOptions
 from creepkit.options import Options, table_of
 from creepkit.rupture_assessment.assessment import RuptureQuestion, RuptureSettings
 
@@ -252,6 +253,10 @@ class SelectionTable(_keys(SearchOptions, without=("penalty",)), _OF_SELECTION):
     """[selection]: how laws are compared; without sums, sums are tried where no candidate explains the tests."""
 
 
+class LawSearchTable(_keys(LawSearchOptions), TableModel):  # type: ignore[misc]
+    """[law_search]: of tests of bars, laws that nobody wrote down are candidates of [identification] too."""
+
+
 class TemperatureTable(_keys(DiscoveryOptions, without=("forms",)), TableModel):  # type: ignore[misc]
     """[temperature]: forms of temperature for the parameters of a law, by default the best law of each group."""
 
@@ -326,6 +331,7 @@ class StudyTables(TableModel):
     specimen: SpecimenTable | None = None
     identification: IdentificationTable | None = None
     selection: SelectionTable | None = None
+    law_search: LawSearchTable | None = None
     temperature: TemperatureTable | None = None
     rupture: RuptureTable | None = None
     forecast: Annotated[list[ForecastTable], Field(max_length=100)] = []

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -48,6 +49,20 @@ def test_only_what_changed_runs_again(study: Path) -> None:
     study.write_text(STUDY.replace("frames = 12", "frames = 11"))
     assert made(ck.Study.load(study).run()) == everything - {"quality"}
     assert made(ck.Study.load(study).run(only="quality", again=True)) == {"quality"}
+
+
+def test_a_study_searches_laws_beside_its_candidates(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def searched(tests: Any, using: Any, *, settings: Any, progress: Any, **options: Any) -> Any:
+        assert options == {"budget": 7.0}
+        return SimpleNamespace(ranking=ck.rank([ck.identify("norton", tests, using, settings=settings)]))
+
+    monkeypatch.setattr(ck, "search_laws", searched)
+    study.write_text(
+        ONE_FIT.replace('"norton"', '"hyperbolic-sine"')
+        + "[selection]\nsums = false\nfurther_laws = 0\n[law_search]\nbudget_s = 7\n"
+    )
+    (ranking,) = ck.Study.load(study).run().rankings.values()
+    assert {ranked.fit.law.name for ranked in ranking.laws} == {"norton", "hyperbolic-sine"}
 
 
 def test_other_code_of_the_package_makes_results_again(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
