@@ -14,14 +14,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.perturbation_trials import Challenge
-from creepkit.inverse.selection.ranking import (
-    RankedLaw,
-    Ranking,
-    _are_outdone,
-    challenged,
-    rank,
-    ranking_from_scores,
-)
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking, _are_outdone, challenged, rank, ranking_from_scores
 from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import LinearisedProblem
