@@ -155,7 +155,7 @@ for label, fit in fits.items():
     found = fit.predict()
     print(line(label, [found.of(k)[h.used, 0] for k, h in enumerate(tests)]))
 if folder is not None:
-    held_out = ck.cross_validate(fits["robust"], by="test")
+    held_out = ck.cross_validate(fits["law alone"], by="test")
     print(f"\nleft out in turn, predicted at nominal thickness: pooled loss {held_out.pooled_error('amplitude'):.3g}")
     losses = {name.removeprefix("test_"): e["amplitude"].relative_squared_error for name, e in held_out.errors.items()}
     print("  " + ", ".join(f"{name} {loss:.2g}" for name, loss in losses.items()))

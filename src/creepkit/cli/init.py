@@ -27,7 +27,8 @@ def command(
     from creepkit.studies.proposal import propose_study
 
     if not folder.is_dir():
-        raise StudyError(f"there is no folder {folder}; name the folder of your measured files")
+        what = f"{folder} is a file" if folder.is_file() else f"there is no folder {folder}"
+        raise StudyError(f"{what}; name the folder of your measured files")
     path = folder / "study.toml" if to is None else to
     check_target(path, StudyError)
     proposal = propose_study(folder, path, reader)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit import registry
+from creepkit.arrays import Floats
 from creepkit.errors import FitWarning
 from creepkit.inverse.compared_tests import UNTESTABLE, compared_tests, followed_duration, rests_on_durations
 from creepkit.inverse.frame_noise import usable_frames
@@ -58,13 +59,24 @@ def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> 
     ]
     values_by_name = {
         "stress": stresses or [0.0],
-        "temperature": [v for h in tests for v in h.followed_temperatures],
+        "temperature": [v for h in tests for v in _temperatures(h)],
         "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
         "time": [v for h in tests for v in _time_range(h)],
     }
     conditions = zip(problem.law.conditions, condition_values(problem.law, tests).T, strict=True)
     values_by_name |= {one.name: values.tolist() for one, values in conditions}
     return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
+
+
+def _temperatures(history: History) -> Floats:
+    """(levels,) K, where a stress was imposed without those of pauses."""
+    levels, end = history.followed_temperatures, history.used_times[-1]
+    if history.loading.quantity != "stress" or levels.size < 3:
+        return levels
+    times, load = history.temperature_program().times, history.loading.program()
+    stress = load.at(np.append(times[times < end], end))
+    is_on = (stress >= PAUSE * load.values.max()) | (np.arange(levels.size) == 0)
+    return levels[is_on]
 
 
 def _time_range(history: History) -> tuple[float, float]:

@@ -276,7 +276,7 @@ def _time_and_end(
             end = conditions.end_terms.get(text.casefold()) or end_said_by(text)
             end, asked = {INTERRUPTED: STOPPED, LABEL: ""}.get(end, end), label if asks and end == UNCLEAR else asked
         else:
-            (end,) = ends_in_column(label, [text], conditions.end_terms, False).ends
+            (end,) = ends_in_column(label, [text], conditions.end_terms, [False]).ends
         firmness = firm if kind in FIRM or at == "last" else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())

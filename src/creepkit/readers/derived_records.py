@@ -392,8 +392,11 @@ def _loaded_by_ramp(
         return StrainRecord(strain, used, True, None if found is None else found[0])
     if end < FEWEST_RAMP_FRAMES and stress[end] < SOFTEST * (strain[end] - strain[0]):
         return None
-    conditions.record_assumption(f"includes_elastic no (loading strain {strain[end]:.3g} subtracted) and {until}")
-    return StrainRecord(strain - strain[end], used, includes_elastic=False)
+    on = under_load(stress)
+    until += "" if on.all() else ", nor those of pauses, without the elastic part"
+    what = f"includes_elastic no (loading strain {strain[end]:.3g} subtracted) and {until}"
+    conditions.record_assumption(what.replace(",", ""))
+    return StrainRecord(strain - strain[end], used & on, includes_elastic=False)
 
 
 def _decided(

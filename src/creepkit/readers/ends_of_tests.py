@@ -262,21 +262,24 @@ def kind_of_column(name: str) -> str:
     return "status" if len(others) < len(words) and all(map(_STATUS_FILLERS.fullmatch, others)) else ""
 
 
-def ends_in_column(name: str, cells: Sequence[str], answers: Mapping[str, str], others_decide: bool) -> EndsOfColumn:
+def ends_in_column(
+    name: str, cells: Sequence[str], answers: Mapping[str, str], others_decide: Sequence[bool]
+) -> EndsOfColumn:
     """What a column says of the end of each test.
 
-    answers : {text or code in small letters: RUPTURED, STOPPED or LABEL} that were given. others_decide : whether
-    another column says how each test ended, so that a remark that is not understood leaves nothing open.
+    answers : {text or code in small letters: RUPTURED, STOPPED or LABEL} that were given. others_decide : of each cell,
+    whether another column says how the test ended, so that a remark that is not understood leaves nothing open.
     """
     kind, answers = kind_of_column(name), {**legend_in(name), **answers}
-    texts = ["" if is_missing(cell) else " ".join(cell.split()) for cell in cells]
+    says = [not is_missing(cell) or (kind != "" and cell.casefold() in ("n.b.", "n. b.")) for cell in cells]
+    texts = [" ".join(cell.split()) if one else "" for one, cell in zip(says, cells, strict=True)]
     plain = {text.casefold() for text in texts if text}
     meanings = _meanings(kind, plain)
     meanings |= {text: answers[text] for text in {*plain, ""} if text in answers}
     ends, asked = list[str](), dict[str, None]()
-    for text in texts:
+    for text, is_decided in zip(texts, others_decide, strict=True):
         end = meanings.get(text.casefold(), UNCLEAR)
-        if end == UNCLEAR and kind not in FIRM and others_decide:
+        if end == UNCLEAR and kind not in FIRM and is_decided:
             end = ""
         if end == UNCLEAR:
             asked[text] = None

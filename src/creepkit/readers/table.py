@@ -287,7 +287,10 @@ def _columns_called(name: str, cells: Sequence[str]) -> list[int]:
     filled = [k for k, cell in enumerate(cells) if cell]
     exact = [k for k in filled if cells[k] == name]
     alike = exact or [k for k in filled if plain_name(cells[k]) == plain]
-    return alike or [k for k in filled if plain_name(split_written_name(cells[k])[0]) == plain]
+    bare = plain_name(split_written_name(name)[0])  # of a name whose unit stands in a row of its own
+    return alike or [
+        k for k in filled if plain_name(split_written_name(cells[k])[0]) == plain or plain_name(cells[k]) == bare
+    ]
 
 
 def check_columns(location: str, columns: Sequence[str]) -> None:

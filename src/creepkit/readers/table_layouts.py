@@ -16,7 +16,7 @@ from typing import NamedTuple
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.ends_of_tests import kind_of_column
+from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
 from creepkit.readers.table import (
     CellTable,
@@ -89,6 +89,31 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
         if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
             notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
+
+
+_DAY, _OF_DAY = (
+    re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}(?: 00:00:00)?"),
+    re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?"),
+)
+"""A date, as of a spreadsheet too, and a time of the day."""
+
+
+def with_days(table: CellTable, known: Terms) -> CellTable:
+    """The table with dates before the times of day beside them: without them readings of every day lie in one."""
+    names = [words_of(name) for name in table.columns]
+    days = [k for k, name in enumerate(names) if name in ("date", "datum", "day", "jour")]
+    clocks = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time" or names[k] == "heure"]
+    if len(days) != 1 or len(clocks) != 1 or days == clocks:
+        return table
+    (day,), (clock,) = days, clocks
+    if not all(_DAY.fullmatch(row.cells[day]) and _OF_DAY.fullmatch(row.cells[clock]) for row in table.rows):
+        return table
+    rows = [TableRow(row.line, [*row.cells]) for row in table.rows]
+    for row, joined in zip(table.rows, rows, strict=True):
+        joined.cells[clock] = f"{row.cells[day].partition(' ')[0]} {row.cells[clock]}"  # type: ignore[index]
+    columns = ["timestamp" if k == clock else name for k, name in enumerate(table.columns)]
+    table = table.assuming(f"'{table.columns[day]}' and '{table.columns[clock]}' are one time")
+    return replace(table, rows=rows, columns=columns).keeping([k for k in range(len(columns)) if k != day])
 
 
 def without_clocks(table: CellTable, known: Terms) -> CellTable:
@@ -503,7 +528,7 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
         head.read(row)
     refuse_twice(head.entries, headed.table.header, headed.known)
     table, footers = _without_remarks_around(headed.table, head.entries)
-    table = without_clocks(named_columns(table), headed.known)
+    table = without_clocks(with_days(named_columns(table), headed.known), headed.known)
     table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
     table = without_remarks(table, head.entries, headed.known.vocabulary.labels)
     table = with_groups(with_names(table, headed.known), headed.known)
@@ -519,6 +544,8 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
     while count > 2 and _is_remark(row := table.rows[count - 1], table):
         count -= 1
         text = " ".join(filter(None, row.cells))
+        if end_said_by(text):
+            notes[f"label remark line {row.line}"] = SourceText(text, table.location(row.line))
         footers.insert(0, f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
     rows, width = list[TableRow](), max((k for k, cell in enumerate(table.rows[0].cells, 1) if cell), default=0)
     for row in table.rows[:count]:

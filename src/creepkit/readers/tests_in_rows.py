@@ -297,11 +297,12 @@ def ends_of_rows(table: TestTable) -> list[RowEnd]:
         )
         and (kinds[k] or not split_written_name(table.names[k])[1])  # one with a unit is a quantity
     ]
-    decided = any(mark.said == STOPPED for mark in marks)
+    decided = [mark.said == STOPPED for mark in marks]
     found = dict[int, EndsOfColumn]()
     for k in sorted(columns, key=lambda k: kinds[k] not in FIRM):
         found[k] = ends_in_column(table.names[k], [row.cells[k] for row in table.rows], answers, decided)
-        decided |= kinds[k] in FIRM and any(found[k].ends)
+        if kinds[k] in FIRM and any(found[k].ends):
+            decided = [True] * len(decided)
     if time is None and duration is None:
         found = {k: one for k, one in found.items() if kinds[k] in FIRM}
     ends = list[RowEnd]()

@@ -51,6 +51,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "clock", "zeit", "elapsed"),
         *("elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time", "時間"),
         *("time of day", "time elapsed", "creep time", "time under load", "prüfzeit", "laufzeit", "belastungszeit"),
+        *("datum und uhrzeit", "datum uhrzeit", "datum/uhrzeit", "datum zeit", "date et heure", "date heure"),
         *("beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
     ),
     "date": ("date", "datum", "day", "jour", "heure"),

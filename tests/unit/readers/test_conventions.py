@@ -458,3 +458,13 @@ def test_a_file_of_a_testing_machine_with_an_interruption(tmp_path: Path) -> Non
     assert test.used.tolist() == (clock > 0.009).tolist()
     fit = ck.identify(ck.law("norton").fix(n=1.0), [test], nuisances=())
     assert float(fit.rate(160.0, 873.15)[0]) == pytest.approx(1e-4 / 3600.0, rel=0.02)
+
+
+def test_a_day_beside_a_time_of_day_is_one_time_and_an_answer_may_name_the_unit_of_another_row(tmp_path: Path) -> None:
+    """Read once a day at about nine: without its day a test of three days lasts minutes."""
+    rows = [f"0{day}.03.2023;09:{7 * day:02d}:00;{0.01 * day:.3f};600;0.1" for day in (1, 2, 3, 4)]
+    (tmp_path / "a.csv").write_text("Datum;Uhrzeit;Dehnung;Temperatur;Weg 2\n;;%;°C;mm\n" + "\n".join(rows) + "\n")
+    answers = '["a.csv"]\nstress_MPa = 120\ncolumns = {"Weg 2 (mm)" = "unused"}\n'
+    (tmp_path / "tests.toml").write_text(answers)
+    (test,) = ck.read_histories(tmp_path)
+    np.testing.assert_allclose(test.times / 3600.0, [0.0, 24 + 7 / 60, 48 + 14 / 60, 72 + 21 / 60])

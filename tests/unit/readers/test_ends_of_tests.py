@@ -1,5 +1,6 @@
 """How a test ended, as laboratories write it in English, German and French: decided or asked for, never a rupture."""
 
+import re
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -306,3 +307,21 @@ def test_months_on_the_clock_of_a_spreadsheet(first_day: datetime, tmp_path: Pat
     book.save(tmp_path / "long 60 MPa 850C.xlsx")
     (history,) = ck.read_histories(tmp_path / "long 60 MPa 850C.xlsx")
     np.testing.assert_allclose(history.times / 86400, days, rtol=1e-9)
+
+
+@pytest.mark.parametrize("remark", ["DNF", "n.b."])
+def test_a_remark_of_one_row_is_asked_about_though_another_row_is_marked(tmp_path, remark):
+    head = "Test;Temp (C);Stress (MPa);Life (h);Remarks\nA;600;200;1000;\n"
+    (tmp_path / "a.csv").write_text(f"{head}B;600;150;5000;{remark}\nC;600;180;>2000;\n")
+    with pytest.raises(HistoryError, match=f"'Remarks' says '{re.escape(remark)}': did these tests break"):
+        ck.read_histories(tmp_path)
+    (tmp_path / "tests.toml").write_text(f'["a.csv"]\nended = {{"{remark}" = "stopped"}}\n')
+    assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False, True, True]
+
+
+def test_a_remark_below_the_frames_says_how_the_test_ended(tmp_path):
+    frames = "# stress_MPa: 120\n# temperature_C: 600\nTime (h);Strain (%)\n0;0\n452;5\n"
+    for text, ruptured, stopped in (("END OF RUN, REMOVED UNBROKEN", None, True), ("Bruch der Probe", 452.0, False)):
+        (tmp_path / "a.csv").write_text(frames + text + "\n")
+        (test,) = ck.read_histories(tmp_path)
+        assert (test.rupture_time and test.rupture_time / 3600.0, test.unruptured) == (ruptured, stopped)
