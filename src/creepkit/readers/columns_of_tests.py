@@ -108,6 +108,10 @@ _IS_TIME = re.compile(
 )
 RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
 _OF_CREEP = re.compile(r"\b(?:min\w*|steady|second\w*|station\w*|sekund\w*|creep|fluage)\b|kriech")
+_RATE_SYMBOL = re.compile("[εɛe]\u0307[ _]?(?:min|ss?|m|st|c)?")
+"""A dot above the strain, its letters apart from their accents."""
+
+
 _OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine)\b")
 _OF_OTHERS = re.compile(r"elong|dehnung\b|strain\b|allong|parameter|ratio|log|sd\b|std|error|stress\b|date|datum")
 _FACTOR = re.compile(
@@ -161,6 +165,8 @@ def _meaning(name: str, is_per_cent: bool) -> str:
 def _quantity_by_words(name: str, unit: str) -> str:
     """The quantity of which the words of a name speak, whatever else they say of it."""
     plain = plain_words(name)
+    if _RATE_SYMBOL.fullmatch(unicodedata.normalize("NFD", name)) and unit in RATE.units:
+        return "minimum_rate"
     is_rate = RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
     if is_rate and (unit in RATE.units or unit in ("", "pct")):
         return "minimum_rate"

@@ -43,7 +43,7 @@ from creepkit.readers.table import (
 from creepkit.readers.table_heads import conditions_in_text, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import SEPARATE
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, words_of
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, unit_suffix, words_of
 from creepkit.records import History
 
 SPREADSHEET_SUFFIXES = (".xlsx", ".xlsm")
@@ -378,7 +378,7 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
     named = [sum(map(bool, row.cells)) > 1 and bool(_keys_tests(row, known)) for row in sheet.rows[:_FILLED_ROWS]]
     if True not in named[: len(sheet.rows) - 1]:
         return {}
-    sheet = replace(sheet, rows=sheet.rows[named.index(True) :])
+    sheet = _in_one_row_a_test(replace(sheet, rows=sheet.rows[named.index(True) :]))
     table = named_columns(without_ignored(sheet, 0, vocabulary.ignored))
     (column, *_), tests = [*_keys_tests(TableRow(0, table.columns), known), -1], dict[str, dict[str, SourceText]]()
     by_alloy = known.condition(table.columns[column]) == "alloy"
@@ -396,6 +396,20 @@ def _conditions_by_test(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[
         if empty := [name for name in table.empty_columns(row) if known.is_condition(name)]:
             tests[test]["label assumed"] = SourceText(", ".join(map(unknown_text, empty)), place)
     return tests
+
+
+def _in_one_row_a_test(sheet: CellTable) -> CellTable:
+    """A sheet of conditions with units beside its names, merged cells in each row, and without remarks below."""
+    (names, *rows), above = sheet.rows, dict[int, str]()
+    units = rows[0].cells if rows and all(unit_suffix(cell) for cell in rows[0].cells if cell) else ()
+    for k, unit in enumerate(units):
+        names = TableRow(names.line, [f"{c} ({unit})" if k == n and unit else c for n, c in enumerate(names.cells)])
+    filled = list[TableRow]()
+    for row in rows[bool(units) :]:
+        cells = [above.get(k, "") if (row.line, k) in sheet.merged else cell for k, cell in enumerate(row.cells)]
+        above |= dict(enumerate(cells))
+        filled += [TableRow(row.line, cells)] * (sum(map(bool, row.cells)) > 1)
+    return replace(sheet, rows=[names, *filled])
 
 
 def _titles(sheet: CellTable, known: Terms) -> tuple[SourceText, ...]:

@@ -257,6 +257,8 @@ class HeadOfTest:
         place, cells, known = self.table.location(row.line), [cell for cell in row.cells if cell], self.known
         if self.table.dialect.delimiter == " ":
             cells = [" ".join(cells)]
+        while len(cells) > 1 and cells[0] == cells[1] and not known.is_condition(cells[0].rstrip(": ")):
+            cells = cells[1:]  # a title in merged cells
         key, colon, value = (part.strip() for part in "".join(cells[:1]).partition(":"))
         is_program = known.condition(key).endswith(("_steps", "_program"))  # whose pairs a delimiter may have parted
         if colon and known.is_condition(key) and (len(cells) == 1 or is_program):

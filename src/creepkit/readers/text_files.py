@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -90,6 +91,7 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if is_labview(text):
         text = table_of_labview(text)
+    text = _with_tabs_for_bars(text)
     text, head, offset = _with_names_behind_marks(text, *_head_of(text))
     if offset == len(text):
         problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
@@ -113,6 +115,23 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
         ],
     )
     return without_logarithms(table)
+
+
+_RULE = re.compile(r"[|:\-\s]*$")
+
+
+def _with_tabs_for_bars(text: str) -> str:
+    """The text of a table drawn with bars, `| 0.5 | 12.2 |`, with tabs in their places and without its rules."""
+    begun = (line.strip() for line in text[:_BEGINNING].split("\n")[:_DRAWN])
+    lines = [line for line in begun if line and not is_comment(line)]
+    if len(lines) < 2 or not all(line[0] == "|" == line[-1] for line in lines[:-1]):
+        return text
+    cells = (line.strip().removeprefix("|").removesuffix("|").split("|") for line in text.split("\n"))
+    return "\n".join("" if _RULE.match("|".join(row)) else "\t".join(map(str.strip, row)) for row in cells)
+
+
+_DRAWN = 40
+"""Lines that tell whether a table is drawn with bars."""
 
 
 def _numbered(

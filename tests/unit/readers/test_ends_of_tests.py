@@ -325,3 +325,47 @@ def test_a_remark_below_the_frames_says_how_the_test_ended(tmp_path):
         (tmp_path / "a.csv").write_text(frames + text + "\n")
         (test,) = ck.read_histories(tmp_path)
         assert (test.rupture_time and test.rupture_time / 3600.0, test.unruptured) == (ruptured, stopped)
+
+
+def test_a_workbook_with_a_summary_of_merged_cells_a_row_of_units_and_a_note_below(tmp_path):
+    book = Workbook()
+    sheet = book.active
+    sheet.title = "Summary"
+    rows = [
+        ("Programme IN-X, all tests",),
+        (),
+        ("Specimen", "Temp.", "Stress", "Rupture time", "Outcome"),
+        ("", "°C", "MPa", "h"),
+        ("K1", 650, 150, 20.0, "broken"),
+        ("K2", None, 120, None, "discontinued after 30 h"),
+        ("Q. A. 2021",),
+    ]
+    for row in rows:
+        sheet.append(row)
+    sheet.merge_cells("A1:E1")
+    sheet.merge_cells("B5:B6")
+    for name in ("K1", "K2"):
+        sheet = book.create_sheet(name)
+        head = [(f"Specimen {name}", None, None, None, "checked: MB"), (), ("t", "creep strain"), ("[h]", "[%]")]
+        for row in [*head, (10, 0.1), (15, 0.2, None, None, "by hand"), (20 if name == "K1" else 30, 0.4)]:
+            sheet.append(row)
+        sheet.merge_cells("A1:C1")
+    book.save(tmp_path / "b.xlsx")
+    first, second = ck.read_histories(tmp_path)
+    assert [(one.name, one.temperature, one.loading.steps) for one in (first, second)] == [
+        ("K1", 923.15, ((0.0, 150.0),)),
+        ("K2", 923.15, ((0.0, 120.0),)),
+    ]
+    assert (first.rupture_time, second.unruptured) == (72000.0, True)
+
+
+def test_tables_drawn_with_bars_and_rates_with_a_dot_above(tmp_path):
+    drawn = "# temperature_K: 873\n| t (h) | stress (kg/mm2) | creep, % | note |\n|---|---|---|---|\n"
+    (tmp_path / "a.txt").write_text(drawn + "".join(f"| {h} | 12.24 | {0.01 * h:.3f} |  |\n" for h in range(1, 9)))
+    (curve,) = ck.read_histories(tmp_path / "a.txt")
+    assert curve.outputs["strain"][-1] == pytest.approx(8e-4)
+    assert curve.loading.program().values[0] == pytest.approx(12.24 * 9.80665)
+    dotted = "Run\tT/K\tσ/MPa\tε̇ss ×10^8 (s^-1)\nM1\t448\t40\t0.117\nM2\t448\t50\t0.312\n"
+    (tmp_path / "b.txt").write_text(f"Table 2. Mg-Al\n{dotted}", "utf-8")
+    rates = [one.minimum_rate for one in ck.read_histories(tmp_path / "b.txt")]
+    assert rates == pytest.approx([1.17e-9, 3.12e-9])
