@@ -37,7 +37,7 @@ BUDGET = {
     "laws": 140,
     "modules": 747,
     "quality": 1126,
-    "readers": 6099,
+    "readers": 6128,
     "records": 2345,
     "registry": 608,
     "reports": 5729,

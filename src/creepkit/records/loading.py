@@ -374,7 +374,7 @@ def _levels_text(program: Program) -> str:
     held, values = _held_levels(program), program.values
     if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
         return " to ".join(f"{level:g}" for level in held)
-    if values[0] <= RAMPED * values.max():  # a load that was recorded from its ramp on
+    if values[0] <= RAMPED * values.max() > 0.0:  # a load that was recorded from its ramp on
         return f"{values[-1] if values[-1] > 0.5 * values.max() else values.max():.4g}"
     return f"{values[0]:g} to {values[-1]:g}"
 
