@@ -40,7 +40,7 @@ BUDGET = {
     "readers": 6128,
     "records": 2345,
     "registry": 608,
-    "reports": 5729,
+    "reports": 5730,
     "rupture_assessment": 1841,
     "sampling": 960,
     "screening": 547,

@@ -76,7 +76,7 @@ def _temperatures(history: History) -> Floats:
     times, load = history.temperature_program().times, history.loading.program()
     stress = load.at(np.append(times[times < end], end))
     is_on = (stress >= PAUSE * load.values.max()) | (np.arange(levels.size) == 0)
-    return levels[is_on]
+    return np.asarray(levels[is_on])
 
 
 def _time_range(history: History) -> tuple[float, float]:

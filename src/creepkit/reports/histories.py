@@ -52,7 +52,8 @@ def _remarks(histories: Sequence[History]) -> list[str]:
         labels = {f"label {key}": value for key, value in history.labels.items() if key != "assumed"}
         for key, value in {**lengths, **labels}.items():
             values.setdefault(key, Counter())[value] += 1
-    remarks = _counted(Counter(map(kind_of_test, histories)), len(histories))
+    remarks = [_output_text(one, name) for one in histories if len(histories) == 1 for name in one.outputs]
+    remarks += _counted(Counter(map(kind_of_test, histories)), len(histories))
     remarks += _counted(Counter(_strain_text(h) for h in histories if "strain" in h.outputs), len(histories))
     remarks += filter(None, assumptions_text(histories).splitlines())
     for key, counts in values.items():
