@@ -3,7 +3,7 @@
     python tests/benchmarks/law_search_measured.py [--data FOLDER] [--sets cmsx6 ...] [--budget 60]
                                                    [--gplearn PYTHON] [--write]
 
-CMSX-6 (950 °C) without its tests at the highest stress, Alloy 617 (base metal) without those at the highest
+CMSX-6 (980 °C) without its tests at the highest stress, Alloy 617 (base metal) without those at the highest
 temperature; curves up to 5 % strain. Every answer is judged by the rms of ln rate: mean rates of the smoothed curves,
 at the strain and time that were measured, fitted tests and tests left out. The best law of search_laws() and the best
 registered law beside it; pysindy 2.1.0, STLSQ on polynomials of second degree of ln stress, ln strain, ln time and
