@@ -12,7 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from textwrap import wrap
+from textwrap import TextWrapper, wrap
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
@@ -289,13 +289,13 @@ def _lines(block: Block) -> list[str]:
     if isinstance(block, Answer):
         return _answer_lines(block)
     if isinstance(block, Paragraph):
-        return [f"warning: {block.text}" if block.role == "warning" else block.text]
+        return _indented(f"warning: {block.text}" if block.role == "warning" else block.text, "")
     if isinstance(block, Items):
-        return [f"- {item}" for item in block.items]
+        return [line for item in block.items for line in _indented(f"- {item}", "")]
     if isinstance(block, Table):
         table = block.filled.folded(WIDTH - 2)
         lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
-        return ["", *([f"{table.caption}:"] if table.caption else []), *lines, ""]
+        return ["", *(_indented(f"{table.caption}:", "") if table.caption else []), *lines, ""]
     if isinstance(block, Formula):
         return [f"  {block.equation}"]
     if isinstance(block, Verbatim):
@@ -311,7 +311,7 @@ def _answer_lines(answer: Answer) -> list[str]:
     for text in (*map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
         lines += _indented(text)
     remarks = [*map(_indented, answer.remarks)]
-    figures = [f"{name} at {where}: {value}{remark and ', '}{remark}" for name, where, value, remark in answer.figures]
+    figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
     said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
     end = _indented(f"next: {answer.next_step}; more: {answer.more}")
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
@@ -324,5 +324,6 @@ def _answer_lines(answer: Answer) -> list[str]:
 def _indented(text: str, first: str = "  ") -> list[str]:
     """Lines of a text, indented by two and four; blanks that do not break hold the pieces of a value together."""
     text = _UNIT.sub("\u00a0", text)
-    lines = wrap(text, WIDTH, initial_indent=first, subsequent_indent=2 * first, break_long_words=False)
+    fill = TextWrapper(WIDTH, first, 2 * first, break_long_words=False, break_on_hyphens=False)  # names of laws
+    lines = fill.wrap(text)
     return [line.replace("\u00a0", " ") for line in lines]

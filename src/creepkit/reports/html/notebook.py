@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import singledispatch
 from itertools import count
 
+from creepkit.experiments.planned_design import Design
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
@@ -15,6 +16,7 @@ from creepkit.reports.answer import equations
 from creepkit.reports.blocks import Block, Formula, Paragraph, Verbatim, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
+from creepkit.reports.design import design_blocks
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks, tests_figure
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
@@ -83,6 +85,7 @@ def _(tests: Histories) -> Sequence[Block]:
 _blocks.register(History)(lambda history: _blocks(Histories([history])))
 _blocks.register(Specimen)(specimen_blocks)
 _blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
+_blocks.register(Design)(lambda design: design_blocks(design, _figures()))
 _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])
 
 
