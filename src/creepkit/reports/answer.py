@@ -117,8 +117,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
-        return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
+        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), *_lives(fit)]
+        return [one for one in (*found, by_rates) if math.isfinite(one.value)]
     r = fit.tested_point
     of_state = ""
     if depends_on_history(fit.law):
@@ -131,7 +131,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
-    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
+    rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
+    return [figures[0], *_lives(fit), *figures[1:], rate_figure]
 
 
 def _lives(fit: Identification) -> list[KeyFigure]:

@@ -304,21 +304,30 @@ def _lines(block: Block) -> list[str]:
 
 
 def _answer_lines(answer: Answer) -> list[str]:
-    """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details."""
-    pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
-    pieces += [f"({answer.units})"] if pieces else []
-    head, lines = _indented(f"{answer.headline} ({answer.tests})", ""), list[str]()
-    for text in (*map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
-        lines += _indented(text)
-    remarks = [*map(_indented, answer.remarks)]
+    """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details.
+
+    So do the intervals of values where they would leave no room for one figure.
+    """
     figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
-    said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
-    end = _indented(f"next: {answer.next_step}; more: {answer.more}")
+    head = _indented(f"{answer.headline} ({answer.tests})" if answer.tests else answer.headline, "")
+    end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
-    for parts, least in ((warned, 1), (said, 1), (remarks, 0), (said, 0)):
-        while len(parts) > least and sum(map(len, (head, *remarks, lines, *said, *warned, end))) > MOST_LINES:
-            parts.pop()
-    return [*head, *chain(*remarks), *lines, *chain(*said, *warned), *end]
+    for intervals in (True, False):
+        pieces = [
+            " ".join([f"{name} = {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
+            for name, value, ends, unit in answer.values
+        ]
+        pieces += [f"({answer.units}{'' if intervals else '; intervals: in the details'})"] if pieces else []
+        law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
+        said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
+        remarks = [*map(_indented, answer.remarks)]
+        for parts, least in ((warned, 1), (said, 1), (remarks, 0), *[(said, 0)] * (not intervals)):
+            while len(parts) > least and sum(map(len, (head, *remarks, law, *said, *warned, end))) > MOST_LINES:
+                parts.pop()
+        lines = [*head, *chain(*remarks), *law, *chain(*said, *warned), *end]
+        if len(lines) <= MOST_LINES:
+            break
+    return lines
 
 
 def _indented(text: str, first: str = "  ") -> list[str]:

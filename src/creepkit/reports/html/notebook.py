@@ -30,8 +30,9 @@ from creepkit.rupture_assessment.assessment import RuptureAssessment
 STYLE = (
     ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(18rem,1fr));gap:0 1rem}"
     ".creepkit .formula math{width:fit-content;margin:0}"
-    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
-    ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
+    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0;font-weight:600}"
+    ".creepkit dl>div{margin:.4rem 0}.creepkit figure{margin:.5rem 0}"
+    ".creepkit dd.note{font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
     ".creepkit table{border-collapse:collapse}.creepkit caption{text-align:left;opacity:.7}"
     ".creepkit th,.creepkit td{text-align:left;padding:.2rem 1rem .2rem 0;border-bottom:1px solid #8886}"
     ".creepkit .n{text-align:right}"
