@@ -61,6 +61,7 @@ NEXT = {
     "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
+    "remedy": "find out whether there was {remedy}: the law would then explain the tests",
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     "determine otherwise": "make a test that determines {names} (creepkit design)",
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
