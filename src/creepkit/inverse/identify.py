@@ -28,7 +28,6 @@ from creepkit.inverse.errors_of_tests import (
     errors_of_tests,
     with_expected_scatter,
 )
-from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
@@ -169,23 +168,8 @@ def _without_one_test(fit: Identification) -> Identification:
     except CreepkitError:
         return fit
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
-    if len(first.tests) == 1:
-        position = [h.name for h in fit.histories].index(first.tests[0])
-        again = _beside_the_others(fit, without, position, first)
-        first = replace(again, factors=(float(np.exp(again.size)),), near=first.near)
     explanations = (replace(first, without=values), *rest)
     return replace(fit, adequacy=replace(adequacy, explanations=explanations))
-
-
-def _beside_the_others(fit: Identification, without: Identification, test: int, found: Explanation) -> Explanation:
-    """One test, by its position, beside the law of the others: the problem is made linear there and at its own rate."""
-    problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
-    x[: len(without.u)] = without.u
-    log_factors[test] = found.size
-    linear = problem.about_rates(x, log_factors).linearised(x)
-    others = RateExplanations(problem, x, linear, without.noise_model)
-    size = float(others.scatter.log_factor[test])
-    return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
 def _estimated(
@@ -240,7 +224,8 @@ def _wider_law(found: EstimationResult) -> CreepLaw | None:
 def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
     """The law within those wider bounds that the tests need, by intervals as they are reported."""
     found, estimator = end.best, _working_estimator(end.best.problem, end.numerical_error)
-    problem, linear, noise = found.problem, found.linear, estimator.final(found.linear, found.noise)
+    problem, linear = found.problem, found.linear
+    noise = estimator.final(linear, found.noise, problem.parameter_count)
     working_noise = None if estimator.by_likelihood else with_single_value_weight(found.noise, problem.observations)
     errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
     by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
@@ -384,7 +369,7 @@ def _reported(
     estimator = _working_estimator(found.problem, numerical_error)
     best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
     problem, linear, x = best.problem.with_simulated_stresses(best.x), best.linear, best.x
-    noise_model = estimator.final(linear, best.noise)
+    noise_model = estimator.final(linear, best.noise, problem.parameter_count)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
     working_noise, errors, judged = None, best.errors, linear
