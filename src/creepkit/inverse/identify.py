@@ -146,8 +146,8 @@ def describing(fit: Identification) -> Identification:
     Where it misses the shape of curves its likelihood is that of the misfit: values are those of frames of equal
     weight.
     """
-    missed = fit.settings.weights == "likelihood" and fit.adequacy is not None and fit.adequacy.misses_shape()
-    if not missed or fit.predictor is None:
+    adequacy = fit.adequacy
+    if fit.settings.weights != "likelihood" or adequacy is None or fit.predictor is None or not adequacy.misses_shape():
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
@@ -210,6 +210,8 @@ def _estimated(
         if end is not usual and (kept := _law_of_determined(usual, end)).params != end.problem.law.params:
             is_wider = kept.params != usual.problem.law.params  # if not, nor is more told through the last predictor
             end, widenings = (within(kept, stage, usual.best), widenings) if is_wider else (usual, 0)
+        if not widenings:  # what waited for wider bounds
+            end = end._replace(best=_describing_estimate(end.best, DESCRIBING_LIMITS, how._replace(widens=False)))
         problem, starts, noise = replace(end.problem, settings=end.best.problem.settings), [end.best.x], end.best.noise
     _check_bounds(end.best)
     return end.best, outcome, end.numerical_error
@@ -249,12 +251,14 @@ class EstimationOptions(NamedTuple):
 
     is_near : whether it begins near its end. through : a cheaper predictor, which comes first. judged : the tests with
     all frames, where an end that clearly misses the shape of curves goes on with those weights that describe them.
+    widens : whether bounds are still widened, before which it waits.
     """
 
     is_near: bool
     through: Predictor | None
     judged: Sequence[History] | None
     progress: IterationCallback | None
+    widens: bool = True
 
 
 class StageEnd(NamedTuple):
@@ -322,7 +326,7 @@ def _describing_estimate(found: EstimationResult, limits: IterationLimits, how: 
     With rates that share nothing the exponent would be that of the bend of single curves.
     """
     problem, linear, noise = found.problem, found.linear, found.noise
-    if how.judged is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
+    if how.judged is None or problem.settings.weights != "likelihood" or (how.widens and _wider_law(found)):
         return found
     if noise.rate < UNRELATED_RATES:
         if not autocorrelated_components(noise):  # the curves are followed to a white noise
