@@ -364,8 +364,8 @@ KEY = "noise_correlation"
 
 def read_noise_correlation(conditions: StatedConditions) -> dict[tuple[str, str], float]:
     """{(output, output): correlation} as the head states them; the history refuses what cannot be one."""
-    entry, correlations = conditions.take_entry(KEY), dict[tuple[str, str], float]()
-    for item in entry.text.split(";") if entry is not None and entry.text else ():
+    entry, correlations = conditions.take_entry(KEY) or SourceText("", ""), dict[tuple[str, str], float]()
+    for item in filter(None, entry.text.split(";")):
         first, second, number = words if len(words := item.split()) == 3 else ("", "", "")
         if not number or {(first, second), (second, first)} & correlations.keys():
             what = f"{entry.location}: {KEY} holds '{item.strip()}'; write two outputs and a number between -1 and 1"

@@ -366,8 +366,8 @@ def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
     whole = " ".join(text.split())
     match = TIME_IN_CELL.fullmatch(whole)
     if match is None:
-        said = answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR
-        return MarkedTime("", STOPPED if said == INTERRUPTED else said, whole)
+        end = answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR
+        return MarkedTime("", STOPPED if end == INTERRUPTED else end, whole)
     before, number, after = match["before"] or "", match["number"], (match["after"] or "").strip()
     after = after if unit_suffix(after.split(" ")[0].rstrip(".,;()")) not in TIME.units else after.partition(" ")[2]
     if before.strip("([ ") == "" and before:

@@ -313,7 +313,7 @@ def under_load(column: Floats) -> Bools:
 def unloaded(frames: TableFrames, terms: Terms) -> Bools:
     """(frames,) Whether a recorded load is off in a pause."""
     loads = [column for name, column in frames.values.items() if name in terms.number_kinds and column.max() > 0.0]
-    return np.logical_or.reduce([np.zeros(frames.times.size, dtype=bool), *(~under_load(one) for one in loads)])
+    return np.asarray(np.any([np.zeros(frames.times.size), *(~under_load(one) for one in loads)], axis=0))
 
 
 def _grows_steadily(times: Floats, column: Floats) -> bool:
