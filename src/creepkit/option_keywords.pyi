@@ -38,4 +38,3 @@ class RecordOptionsKeywords(TypedDict, total=False):
     units: Mapping[str, str] | None
     pressure_reference: Literal["gauge", "absolute"] | None
     ambient_pressure: float | None
-    missing: Sequence[str] | None

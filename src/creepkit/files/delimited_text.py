@@ -22,10 +22,9 @@ ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL
 """What spreadsheets write for a value that could not be computed or shown; no remark begins so."""
 
 
-MISSING_VALUES = frozenset(
-    ("-", "--", "---", "–", "—", "n.a.", "n.a", "n/a", "na", "n. a.", "n.b.", "n. b.", "n.d.", "k.a.", "k. a.")
-)
-"""What stands for a value that was not measured or not stated, in small letters; nan is a number that was lost."""
+MISSING_VALUES = frozenset(("n.a.", "n.a", "n/a", "na", "n. a.", "n.b.", "n. b.", "n.d.", "k.a.", "k. a."))
+"""What stands for a value that was not measured or not stated, in small letters, beside rows of dashes; nan is a number
+that was lost."""
 
 
 _BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
@@ -244,7 +243,7 @@ def parts_of_lines(text: str, start: int = 0) -> Iterator[str]:
 
 def is_missing(text: str) -> bool:
     """Whether a cell is empty, or holds a mark of what was not measured or not stated."""
-    return not text or (len(text) <= 5 and text.casefold() in MISSING_VALUES)
+    return not text or (len(text) <= 5 and text.casefold() in MISSING_VALUES) or not text.strip("-–—_")
 
 
 def is_number(text: str, dialect: Dialect) -> bool:
@@ -278,8 +277,9 @@ def _why_no_number(text: str, dialect: Dialect) -> str:
 
 def _delimiter(sample: Sequence[str]) -> str:
     """The delimiter by which most cells are numbers and fewest are mangled ones; else by which lines are alike."""
+    drawn = all(line.strip()[:1] == "|" == line.strip()[-1:] for line in sample)
     scores = {delimiter: _score(sample, delimiter) for delimiter in _DELIMITER_NAMES}
-    return max(scores, key=lambda delimiter: scores[delimiter])
+    return max(scores, key=lambda delimiter: (drawn and delimiter == "|", scores[delimiter]))
 
 
 def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:

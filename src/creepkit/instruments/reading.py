@@ -63,7 +63,7 @@ def _record(
     chosen = _format_of(head, formats, format)
     columns = _Columns.of(head, chosen, given)
     reader, times, values, lines = RowReader(head), _Times(columns), [], list[Ints]()
-    missing, count = MISSING | {*chosen.missing, *given.missing}, 0
+    missing, count = MISSING | {*chosen.missing}, 0
     for rows in reader.parts():
         count += len(columns.channels) * rows.lines.size
         if count > MOST_VALUES:

@@ -20,7 +20,7 @@ class RecordOptions(Options, title="options of a record"):
 
     channels : names of those that are kept; None keeps all. units : {channel:
     unit} of heads without one. pressure_reference : of pressures whose unit does not say. ambient_pressure : MPa, that
-    turns absolute pressures into gauge pressures. missing : texts that mean a lost reading, beside the usual ones.
+    turns absolute pressures into gauge pressures.
     """
 
     time: str = option("", "Name of the record's column of time.", flag="record-time")
@@ -36,7 +36,6 @@ class RecordOptions(Options, title="options of a record"):
     ambient_pressure: float | None = option(
         None, "Taken off absolute pressures.", Limits(0.0, 10.0, whole=False), unit="MPa"
     )
-    missing: tuple[str, ...] = option((), "Texts that mean a lost reading.", flag="record-missing")
 
     def __post_init__(self) -> None:
         if self.time_unit and not time_factor(self.time_unit):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import HistoryError, quoted
+from creepkit.errors import HistoryError
 from creepkit.files.delimited_text import (
     Dialect,
     detect_dialect,
@@ -137,8 +137,11 @@ def find_head(path: Path) -> TableHead:
     rows = (k for k, (n, line) in enumerate(sample) if not is_comment(line) and _is_row(cells_of(n, line), dialect))
     at = next(rows, None)
     if at is None:
-        for number, line in sample:
-            _check_decimal_signs(cells_of(number, line), dialect, f"{path}:{number}")
+        other = Dialect(dialect.delimiter, ",.".replace(dialect.decimal, ""))
+        for number, line in sample:  # a row of readings, were all its decimal signs the same, is told by its odd one
+            cells = [cell for cell in cells_of(number, line) if not is_clock_time(cell)]
+            if len(cells) > 1 and all(is_number(cell, dialect) or is_number(cell, other) for cell in cells):
+                parse_numbers(cells, dialect, f"{path}:{number}".format, "a reading")
         raise HistoryError(
             f"{path}:{sample[0][0]}: no row of readings, a time and numbers, in the first {_HEAD_LINES} lines; name a "
             "table"
@@ -171,19 +174,6 @@ def _is_row(cells: Sequence[str], dialect: Dialect) -> bool:
     """Whether a line holds readings: at least one number or time, and nothing else but lost readings."""
     count = sum(is_number(cell, dialect) or is_clock_time(cell) for cell in cells)
     return len(cells) > 1 and count > 0 and count + sum(cell in MISSING for cell in cells) >= 0.8 * len(cells)
-
-
-def _check_decimal_signs(cells: Sequence[str], dialect: Dialect, location: str) -> None:
-    """HistoryError for a row that would be one of readings if all its decimal signs were the same."""
-    other = Dialect(dialect.delimiter, "," if dialect.decimal == "." else ".")
-    numbers = sum(is_number(cell, dialect) or is_clock_time(cell) for cell in cells)
-    odd = [cell for cell in cells if is_number(cell, other) and not is_number(cell, dialect)]
-    if len(cells) > 1 and odd and numbers + len(odd) >= 0.8 * len(cells):
-        words = "points" if dialect.decimal == "." else "commas"
-        raise HistoryError(
-            f"{location}: '{quoted(odd[0])}', where the other numbers have decimal {words}; write all numbers alike, "
-            "without separators between thousands"
-        )
 
 
 def _is_units(cells: Sequence[str]) -> bool:

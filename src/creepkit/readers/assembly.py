@@ -24,10 +24,12 @@ from creepkit.readers.conditions import (
 from creepkit.readers.derived_records import (
     as_plain_bar,
     from_loading_on,
+    length_said,
     modulus_of_ramp,
     with_changes_of_lengths,
     without_loading,
     without_steps,
+    without_unloaded_readings,
 )
 from creepkit.readers.ends_of_tests import (
     FIRM,
@@ -42,13 +44,13 @@ from creepkit.readers.ends_of_tests import (
     ends_in_column,
     kind_of_column,
 )
-from creepkit.readers.frames import UNUSED, TableFrames, column_means, column_question, read_frames
+from creepkit.readers.frames import UNUSED, TableFrames, column_question, read_frames, without_missing_readings
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.table_heads import with_weak_sources
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, unit_suffix, words_of
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, words_of
 from creepkit.records import (
     SECONDS_PER_HOUR,
     UNKNOWN_DURATION,
@@ -59,7 +61,6 @@ from creepkit.records import (
     known_specimens,
     specimen_of,
 )
-from creepkit.records.quantities import LENGTH
 from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.specimens.elastic_part import with_elastic_part
 
@@ -84,6 +85,7 @@ def assemble_history(
     columns in `skipped_columns`; source : what the history says of its origin. columns_as_labels : whether entries that
     resemble no key are labels, as columns of an index are.
     """
+    table = without_missing_readings(table, vocabulary.terms(specimen_named(entries, vocabulary)))
     entries, table = in_standard_names(entries, table, vocabulary)
     known = vocabulary.terms(specimen_named(entries, vocabulary))
     entries, assumed = with_weak_sources(entries, table, known)
@@ -92,7 +94,7 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
-    frames = as_plain_bar(conditions, frames)
+    frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = from_loading_on(conditions, frames)
     for assumption in frames.table.assumptions[len(table.assumptions) :]:
         conditions.record_assumption(assumption)
@@ -146,9 +148,9 @@ def assemble_history(
         rupture_time=rupture_time,
         unruptured=unruptured,
         **_stated_fields(conditions, name, elastic),
-        noise_correlation=read_noise_correlation(conditions, outputs),
+        noise_correlation=read_noise_correlation(conditions),
         # Last: entries that nothing has used by now are refused.
-        labels={**conditions.all_labels(), **column_means(table, vocabulary), **merged},
+        labels={**conditions.all_labels(), **merged},
     )
     _check_operator(history, columns)
     return history
@@ -363,7 +365,7 @@ def _record_unstated(conditions: StatedConditions, specimen: str, is_named: bool
     for name in [*lengths]:
         words, piece = {*name.split("_")}, {*specimen.split("-")} | _WORDS_OF_PIECES
         labels = [key for key in conditions.labels if words <= {*words_of(split_written_name(key)[0]).split()}]
-        said = {key: _length_said(key, conditions.labels[key]) for key in labels}
+        said = {key: length_said(key, conditions.labels[key]) for key in labels}
         found = {key: length for key, length in said.items() if length}
         label = next(iter(found), "")
         if len(found) == 1 and {*words_of(split_written_name(label)[0]).split()} <= words | piece:
@@ -398,19 +400,8 @@ def _record_place(conditions: StatedConditions, table: CellTable, specimen: str)
                 conditions.record_assumption(f"{one.long_name} ({name} has the {two.long_name})")
 
 
-_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
-
-
 _WORDS_OF_PIECES = {"plate", "sheet", "disc", "specimen", "sample", "piece", "initial", "nominal"}
 """That a head says beside the name of a length, such as "specimen thickness"."""
-
-
-def _length_said(head: str, text: str) -> float | None:
-    """mm, of a label that is a number with a unit of length in it or in its head; None of others."""
-    if not (match := _LENGTH.fullmatch(text.strip())):
-        return None
-    unit = unit_suffix(match[2] or split_written_name(head)[1]) or ""
-    return LENGTH.units[unit].factor * float(match[1].replace(",", ".")) if unit in LENGTH.units else None
 
 
 def questions_of_assumed(history: History) -> list[Question]:

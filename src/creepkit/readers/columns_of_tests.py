@@ -187,10 +187,17 @@ def _strain_reached(written: str) -> float | None:
     found = _SYMBOL_TO_STRAIN.fullmatch(text) or re.search(_PER_CENT, text, re.IGNORECASE)
     if found is None or re.search(r"rate|geschwindig|vitesse|grenze|limit|stress|spannung|contrainte|offset", plain):
         return None
-    if not (_SYMBOL_TO_STRAIN.fullmatch(text) or _IS_TIME.search(plain)):
+    if not (plain.strip() == "" or _SYMBOL_TO_STRAIN.fullmatch(text) or _IS_TIME.search(plain)):
         return None
     number = float(found[1].replace(",", "."))
     return number / 100 if 0 < number <= 100 else None
+
+
+def unit_of_times(titles: Sequence[str]) -> str:
+    """The unit in which titles say that times are, as in `temps en heures`; "" where none does, or two differ."""
+    text = " | ".join(map(words_of, titles))
+    found = [unit for unit, names in _UNIT_IN_NAME.items() if re.search(rf"\b(?:in|en) (?:{names})\b", text)]
+    return found[0] if len(found) == 1 and _IS_TIME.search(plain_words(text)) else ""
 
 
 def _unit_of_time(written: str) -> str:

@@ -6,7 +6,7 @@ Nothing that a file states goes unread, and no key is guessed: an unknown one is
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError, refuse_unknown
+from creepkit.errors import CreepkitError, HistoryError
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -38,7 +38,6 @@ from creepkit.readers.vocabulary import (
     unit_suffix,
 )
 from creepkit.records import Program
-from creepkit.records.history import can_hold_together
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
@@ -363,35 +362,15 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, entry: SourceText)
 KEY = "noise_correlation"
 
 
-def read_noise_correlation(conditions: StatedConditions, outputs: Collection[str]) -> dict[tuple[str, str], float]:
-    """{(output, output): correlation} as the head states them; HistoryError for what cannot be one."""
-    entry = conditions.take_entry(KEY)
-    known, correlations = list(outputs), dict[tuple[str, str], float]()
-    if entry is None or not entry.text:
-        return correlations
-    location, text = entry.location, entry.text
-    for item in text.split(";"):
-        words = item.split()
-        if len(words) != 3:
-            raise HistoryError(
-                f"{location}: {KEY} holds '{item.strip()}'; write two outputs and a number between -1 and 1, as in "
-                "'amplitude width -0.31; amplitude shape 0.2'"
-            )
-        first, second, number = words
-        for name in (first, second):
-            refuse_unknown(name, known, HistoryError, f"{location}: {KEY} names '{name}', which is no column")
-        pair = first, second
-        if first == second or pair in correlations or pair[::-1] in correlations:
-            problem = "correlates with itself" if first == second else f"and {second} are given twice"
-            raise HistoryError(f"{location}: {KEY}: {first} {problem}; give each pair of two outputs once")
-        value = replace(entry, text=number).number(f"{KEY} of {first} {second}")
-        if not -1.0 < value < 1.0:
-            raise HistoryError(f"{location}: {KEY} of {first} {second} is {value:g}; allowed is between -1 and 1")
-        correlations[pair] = value
-    if not can_hold_together(correlations):
-        raise HistoryError(
-            f"{location}: the correlations '{text}' cannot all hold: their matrix is not positive definite; correct one"
-        )
+def read_noise_correlation(conditions: StatedConditions) -> dict[tuple[str, str], float]:
+    """{(output, output): correlation} as the head states them; the history refuses what cannot be one."""
+    entry, correlations = conditions.take_entry(KEY) or SourceText("", ""), dict[tuple[str, str], float]()
+    for item in filter(None, entry.text.split(";")):
+        first, second, number = words if len(words := item.split()) == 3 else ("", "", "")
+        if not number or {(first, second), (second, first)} & correlations.keys():
+            what = f"{entry.location}: {KEY} holds '{item.strip()}'; write two outputs and a number between -1 and 1"
+            raise HistoryError(f"{what}, each pair once, as in 'amplitude width -0.31; amplitude shape 0.2'")
+        correlations[first, second] = replace(entry, text=number).number(f"{KEY} of {first} {second}")
     return correlations
 
 

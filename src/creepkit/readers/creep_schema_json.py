@@ -182,9 +182,7 @@ def _history(
                 raise HistoryError(f"{entries[quantity].location}: it is not stated; a test needs its {quantity}")
         if not {"rupture", "ended"} & stated.keys():
             found = "the test piece broke" if entries["end"].text else "it is not stated"
-            what = (
-                f"{found}, and there is no creepRuptureTime; state it, or the criterion by which the test was stopped"
-            )
+            what = f"{found}, and there is no creepRuptureTime; state it, or the criterion by which it was stopped"
             raise HistoryError(f"{entries['end'].location}: {what}")
         for key in ("name", "loading_strain", "strain_measure", *(["end_time"] if "rupture" in stated else [])):
             stated.pop(key, None)
@@ -195,8 +193,7 @@ def _history(
     if extension == CREEP_EXTENSION:
         stated["includes_elastic"] = SourceText("no", str(path))
     stated["includes_loading"] = SourceText("no" if extension == CREEP_EXTENSION else "yes", str(path))
-    if temperatures := tuple(column for column in table.columns if column.startswith("Corrected")):
-        vocabulary = replace(vocabulary, averaged_columns={"measured_temperature_C": temperatures})
+    table = table.keeping([k for k, column in enumerate(table.columns) if not column.startswith("Corrected")])
     return assemble_history(name, stated, table, vocabulary, location=str(path), source=str(path))
 
 

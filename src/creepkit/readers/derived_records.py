@@ -42,11 +42,11 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import UNUSED, TableFrames, column_question
-from creepkit.readers.imposed import hold_begins, under_load
+from creepkit.readers.imposed import OUTLIERS, hold_begins, under_load, unloaded
 from creepkit.readers.table import SourceText
-from creepkit.readers.vocabulary import unit_suffix
+from creepkit.readers.vocabulary import split_written_name, unit_suffix
 from creepkit.records.loading import Program
-from creepkit.records.quantities import STRAIN, TIME
+from creepkit.records.quantities import LENGTH, STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings
 from creepkit.records.specimen_record import Output
 from creepkit.records.units import time_text
@@ -170,20 +170,24 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
         return ["the extension beside the strain not used"]
     if length is None:
         what = "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen:"
-        place, choices = frames.table.location(frames.table.columns_line), _lengths_in(conditions.labels)
+        place = frames.table.location(frames.table.columns_line)
+        said = (length_said(*one) for one in conditions.labels.items() if _LENGTH_NAME.search(one[0]))
         what = f"{what} notched-bar' with its lengths)"
-        raise conditions.question(what, "gauge_length_mm", *choices, location=place)
+        raise conditions.question(what, "gauge_length_mm", *filter(None, said), location=place)
     values["strain"] = elongation / length
     return [f"strain = extension / gauge length {length:g} mm"]
 
 
-def _lengths_in(labels: Mapping[str, str]) -> list[float]:
-    """mm, of labels such as `Length: 50.00 mm`, which may be the gauge length."""
-    found = [re.fullmatch(r"([\d.,]+) ?mm", text) for name, text in labels.items() if _LENGTH_NAME.search(name)]
-    return [float(one[1].replace(",", ".")) for one in found if one]
-
-
 _LENGTH_NAME = re.compile("length|länge|longueur", re.IGNORECASE)
+_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
+
+
+def length_said(head: str, text: str) -> float | None:
+    """mm, of a label that is a number with a unit of length in it or in its head; None of others."""
+    if not (match := _LENGTH.fullmatch(text.strip())):
+        return None
+    unit = unit_suffix(match[2] or split_written_name(head)[1]) or ""
+    return LENGTH.units[unit].factor * float(match[1].replace(",", ".")) if unit in LENGTH.units else None
 
 
 def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
@@ -225,6 +229,20 @@ def _area(conditions: StatedConditions) -> tuple[float | None, str]:
     if "width" in lengths and thickness is not None:
         return lengths["width"] * thickness, f" of {lengths['width']:g} mm x {thickness:g} mm"
     return None, ""
+
+
+def without_unloaded_readings(conditions: StatedConditions, frames: TableFrames) -> TableFrames:
+    """The frames without single ones at which the load was off: how long it was, and how cold it was then, none says.
+
+    Several such frames one after another show a pause, which is part of the program.
+    """
+    off = unloaded(frames, conditions.terms)
+    alone = off & ~np.roll(off, 1) & ~np.roll(off, -1)
+    if not 0 < alone.sum() <= max(1.0, OUTLIERS * alone.size):
+        return frames
+    places = " and ".join(time_text(float(time)) for time in frames.times[alone])
+    conditions.record_assumption(f"the reading without load at {places} left out")
+    return replace(frames, values={n: one[~alone] for n, one in frames.values.items()}, lines=frames.lines[~alone])
 
 
 def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableFrames:

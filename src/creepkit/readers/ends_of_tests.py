@@ -179,7 +179,7 @@ _STATUS_FILLERS = _words(
 _REMARK_WORDS = _words(
     r"remark|remarks|note|notes|comment|comments|bemerkung|bemerkungen|anmerkung|bem|anmerkungen|kommentar",
     r"kommentare|hinweis|hinweise|notiz|notizen|remarque|remarques|observation|observations|commentaire",
-    r"commentaires|rem|anm|beobachtung|beobachtungen",
+    r"commentaires|rem|anm|beobachtung|beobachtungen|meldung|meldungen|message|messages",
 )
 _OTHER_USES = _words(
     r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
@@ -366,7 +366,8 @@ def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
     whole = " ".join(text.split())
     match = TIME_IN_CELL.fullmatch(whole)
     if match is None:
-        return MarkedTime("", answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR, whole)
+        end = answers.get(whole.casefold()) or end_said_by(whole) or UNCLEAR
+        return MarkedTime("", STOPPED if end == INTERRUPTED else end, whole)
     before, number, after = match["before"] or "", match["number"], (match["after"] or "").strip()
     after = after if unit_suffix(after.split(" ")[0].rstrip(".,;()")) not in TIME.units else after.partition(" ")[2]
     if before.strip("([ ") == "" and before:
@@ -381,6 +382,6 @@ def marked_time(text: str, answers: Mapping[str, str]) -> MarkedTime:
         return MarkedTime(number, STOPPED, mark)
     if not before and _ONWARDS.fullmatch(after):
         return MarkedTime(number, STOPPED, mark)
-    said = {STOPPED: STOPPED, "interrupted": STOPPED, RUPTURED: RUPTURED}.get(end_said_by(after), "")
+    said = {STOPPED: STOPPED, "interrupted": STOPPED, RUPTURED: RUPTURED}.get(end_said_by(mark), "")
     codes = {"ro": STOPPED, "nb": STOPPED, "nr": STOPPED, "nf": STOPPED}
     return MarkedTime(number, said or codes.get(after.strip("() ").casefold(), UNCLEAR), mark)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import partial
 from typing import Literal
@@ -13,7 +13,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.files.delimited_text import is_number
+from creepkit.files.delimited_text import is_missing, is_number
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, cells_of, some_of
@@ -55,30 +55,30 @@ class TableFrames:
         """Of which frame a label such as `line 17` is a remark."""
         line = int(label[5:]) if label.startswith("line ") and label[5:].isdecimal() else -1
         last, lines = self.lines[-1], self.table.lines
-        return "last" if last <= line <= lines[-1] else "earlier" if lines[0] <= line < last else ""
+        return "last" if last <= line else "earlier" if lines[0] <= line < last else ""
 
 
 def read_frames(
     table: CellTable, vocabulary: HeaderVocabulary, terms: Terms, skipped_columns: Collection[str] = ()
 ) -> TableFrames:
-    """Read the frames in a table, except `skipped_columns` and those that are averaged to labels."""
+    """Read the frames in a table, except `skipped_columns` and labels."""
     kinds = terms.column_kinds
-    averaged = (name for names in vocabulary.averaged_columns.values() for name in names)
-    ignored = {*skipped_columns, *vocabulary.labels, *averaged}
+    ignored = {*skipped_columns, *vocabulary.labels}
     values, found, errors = dict[str, Floats](), dict[str, str](), list[HistoryError]()
-    notes = list[str]()
+    notes, sensors = list[str](), dict[str, dict[str, Floats]]()
 
     def read(k: int, name: str) -> None:
         written = table.as_written(k)
         quantity, suffix = _parsed_column(table, k, vocabulary.synonyms.get(name, name), kinds)
-        if quantity in found:
+        if quantity in found and (quantity == "time" or not {name, found[quantity]} <= vocabulary.synonyms.keys()):
             raise column_question(
                 table,
                 f"'{found[quantity]}' and '{written}' both hold the {quantity}; which counts?",
                 *({one: UNUSED} for one in (written, found[quantity])),
             )
         found[quantity] = written
-        values[quantity] = _converted_column(table, name, kinds[quantity], suffix)
+        sensors.setdefault(quantity, {})[written] = _converted_column(table, name, kinds[quantity], suffix)
+        values[quantity] = np.mean([*sensors[quantity].values()], axis=0)
         if quantity == "stress" and (table.numbers(name) < 0.0).any() and not (table.numbers(name) > 0.0).any():
             notes.append(_COMPRESSION)
         if quantity == "time" and (table.numbers(name) < 0.0).any():
@@ -100,17 +100,37 @@ def read_frames(
         order = np.argsort(values["time"], kind="stable")
         values = {name: one[order] for name, one in values.items()}
         notes.append("points of a plot in order of time")
+    for quantity, several in sensors.items():
+        if len(several) > 1:
+            apart, unit = np.ptp([*several.values()], axis=0).max(), next(iter(kinds[quantity].units))
+            notes.append(f"{quantity} is the mean of {' and '.join(map(repr, several))} (within {apart:.3g} {unit})")
     table = table.assuming(*notes)
     imposed = [values[name] for name in (*terms.number_kinds, "temperature") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
 
 
-def column_means(table: CellTable, vocabulary: HeaderVocabulary) -> dict[str, str]:
-    """The labels that are means over all frames of some columns, with two decimals."""
-    return {
-        label: f"{np.mean([table.numbers(name) for name in names]):.2f}"
-        for label, names in vocabulary.averaged_columns.items()
-    }
+LARGEST_SHARE_MISSING = 0.1
+"""Of the readings of a test, that may lack a load or a temperature, or one of several outputs."""
+
+
+def without_missing_readings(table: CellTable, known: Terms) -> CellTable:
+    """The table of one test without the rows in which a value is blank or `----`, which is listed.
+
+    Nothing was measured in a row without any output; other values may lack in few rows.
+    """
+    labels = known.vocabulary.labels
+    quantities = {k: known.quantity(name) for k, name in enumerate(table.columns) if name not in labels}
+    values = [k for k, quantity in quantities.items() if quantity not in (None, "time")]
+    outputs = [k for k in values if quantities[k] not in ("temperature", *known.number_kinds)]
+    lack = {row.line: [k for k in values if is_missing(row.cells[k])] for row in table.rows}
+    lost = {line: columns for line, columns in lack.items() if columns}
+    partly = [line for line, columns in lost.items() if not (outputs and {*outputs} <= {*columns})]
+    kept = [row for row in table.rows if row.line not in lost]
+    if not lost or len(partly) > LARGEST_SHARE_MISSING * len(table.rows) or len(kept) < 2:
+        return table
+    name, lines = table.as_written(next(iter(lost.values()))[0]), "; ".join(map(str, [*lost][:3]))
+    what = f"{len(lost)} reading{'s' * (len(lost) > 1)} without a value of '{name}' left out"
+    return replace(table, rows=kept).assuming(f"{what} (line {lines}{'; ...' * (len(lost) > 3)})".replace(",", ";"))
 
 
 def unknown_text(quantity: str) -> str:
@@ -147,8 +167,8 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         if others:
             same = [name for name in names if name == written or name in others]
             counts = [{one: measured, **{o: UNUSED for o in same if o != one}} for one in same]
-            what = f"'{same[0]}' and '{same[1]}' seem to be several sensors of the {sensor}; which counts?"
-            raise column_question(table, what, *counts[:3])
+            what = f"'{same[0]}' and '{same[1]}' seem to be sensors of the {sensor}; does their mean count, or one?"
+            raise column_question(table, what, dict.fromkeys(same, measured), *counts[:2])
         present = {(split_unit(other, kinds) or ("",))[0] for other in table.columns}
         is_known = sensor in ("temperature", "diameter") and unit_suffix(unit) in kinds[sensor].units
         if is_known and sensor not in present:
@@ -166,10 +186,8 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         likely = [name for name, one in OF_UNIT.items() if unit_suffix(unit) in one.units and name not in near]
         likely = [] if unit_suffix(unit) in (None, "") else [name for name in likely if name not in present]
         if _SHEAR.search(written):
-            meant = (
-                f"'{written}' is of shear: a law's stress is sqrt(3) times a shear stress, its strain a shear strain "
-            )
-            meant, near, likely = f"{meant}over sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
+            meant = f"'{written}' is of shear: a law's stress is sqrt(3) times it, its strain the shear strain over"
+            meant, near, likely = f"{meant} sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
         elif _OF_TUBES.search(written):
             near, likely = (["pressure"] if "pressure" in kinds and "hoop" not in written.casefold() else []), []
         named = [] if all(is_number(cell, table.dialect) for cell in cells_of(table.rows, k)) else [{written: "test"}]
@@ -198,7 +216,14 @@ def _sensor(name: str, kinds: Mapping[str, QuantityKind]) -> str:
     """The quantity that one sensor of several measures, `T1_C` or `Temperature top (C)`; "" where it is none."""
     words = split_written_name(name)[0]
     stem = _PLACE_OF_SENSOR.split(words)[0]
-    return NameTable(kinds).meaning(stem) or ("temperature" if stem.casefold() in ("tc", "thermocouple") else "")
+    return NameTable(kinds).meaning(stem) or _SENSORS.get(stem.casefold(), "")
+
+
+_SENSORS = {
+    **dict.fromkeys(("tc", "thermocouple", "thermoelement"), "temperature"),
+    **dict.fromkeys(("weg", "wegaufnehmer", "messuhr", "lvdt", "displacement", "transducer", "capteur"), "elongation"),
+}
+"""{name of a sensor in small letters: what it measures}."""
 
 
 def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: str) -> Floats:

@@ -310,6 +310,12 @@ def under_load(column: Floats) -> Bools:
     return np.asarray(~(is_off & had_begun & returns))
 
 
+def unloaded(frames: TableFrames, terms: Terms) -> Bools:
+    """(frames,) Whether a recorded load is off in a pause."""
+    loads = [column for name, column in frames.values.items() if name in terms.number_kinds and column.max() > 0.0]
+    return np.asarray(np.any([np.zeros(frames.times.size), *(~under_load(one) for one in loads)], axis=0))
+
+
 def _grows_steadily(times: Floats, column: Floats) -> bool:
     """Whether a column is a straight line over time, but for STRAIGHT of its range."""
     line = np.polyval(np.polyfit(times, column, 1), times)
@@ -357,7 +363,7 @@ def _recorded(
         begun, record = _from_rest(frames.times, column) if quantity == "strain" else (frames.times, column)
         program = recorded_program(begun, record, tolerance)
         return program if column.min() < 0.0 else Program(program.times, np.maximum(program.values, 0.0))
-    bounds = [*starts, column.size]
+    bounds, off = [*starts, column.size], unloaded(frames, conditions.terms)
     levels = [float(np.median(column[first:last])) for first, last in pairwise(bounds)]
     times = [0.0, *(float(frames.times[frame]) for frame in starts[1:])]
     for k, (before, frame, after) in enumerate(zip(bounds, bounds[1:-1], bounds[2:], strict=False), 1):
@@ -368,7 +374,8 @@ def _recorded(
         step = levels[k] - levels[k - 1]
         share = (_share_behind_kink if is_temperature else _steps_early)(frames, quantity, (before, frame, after), step)
         unit = "K" if is_temperature else next(iter(conditions.terms.load_kinds[quantity].units))
-        if late - early > LARGEST_GAP * shorter and share is None:
+        is_idle = is_temperature and bool(off[frame - 1 : frame + 1].any())  # nothing creeps in a pause
+        if late - early > LARGEST_GAP * shorter and share is None and not is_idle:
             steps = [[*times[:k], time, *times[k + 1 :]] for time in (early, late)]
             texts = ["; ".join(f"{t:g} s {v:g} {unit}" for t, v in zip(one, levels, strict=True)) for one in steps]
             raise conditions.question(

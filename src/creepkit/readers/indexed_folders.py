@@ -128,7 +128,7 @@ INDEXED_FILES = IndexedFolderReader(
     vocabulary=HeaderVocabulary(
         synonyms={"creep_extension_pct": "strain_pct"},
         end_of_test_terms={"Not applicable": "stopped"},
-        averaged_columns={"measured_temperature_C": ("T_top_C", "T_mid_C", "T_bot_C")},
+        ignored=("T_top_C", "T_mid_C", "T_bot_C"),
         labels=("orientation_deg", "gauge_Le_mm", "duration_h", "elong_pct", "elastic_ext_pct", "init_plastic_pct"),
     ),
 )

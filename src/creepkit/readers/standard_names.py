@@ -58,10 +58,13 @@ def in_standard_names(
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
     known = vocabulary.terms(specimen_named(entries, vocabulary))
     stated = in_standard_keys(entries, known)
-    for key, entry in _stated_by_columns(table):
-        if stated.setdefault(key, entry).text != entry.text:
-            what = f"{key} is '{stated[key].text}', but {entry.location} says {entry.text}"
-            raise HistoryError(f"{stated[key].location}: {what}")
+    by_titles = [one for key, title in entries.items() for one in _stated_by_title(key, title) if one[0] not in stated]
+    table = table.assuming(*(f"{key} {entry.text} by the title in {entry.location}" for key, entry in by_titles))
+    for key, entry in [*_stated_by_columns(table), *by_titles]:
+        if key not in vocabulary.stated and stated.setdefault(key, entry).text != entry.text:
+            what = f"{key} is '{stated[key].text}', but {entry.location} says {entry.text}; which holds?"
+            choices = (stated[key].text, entry.text)
+            raise Question(table.path, stated[key].location, what, key, choices, is_free=False)
     columns = [known.column(name) for name in table.columns]
     table = replace(table, columns=columns, written=table.columns) if columns != list(table.columns) else table
     table = with_elapsed_times(stated, table, known)
@@ -119,6 +122,16 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
     ]
 
 
+def _stated_by_title(key: str, title: SourceText) -> list[tuple[str, SourceText]]:
+    """Conditions that a title states, as `Specimen 7C, TOTAL STRAIN` does; a creep strain rate is none."""
+    words = words_of(title.text) if key.startswith("label line ") else ""
+    found = (re.search(rf"\b{name}\b(?! (?:rate|test|curve|range|vs)\b)", words) and one for name, one in _IN_TITLES)
+    return [(one[0], replace(title, text=one[1])) for one in found if one]
+
+
+_IN_TITLES = [one for one in STATED_BY_NAME.items() if " " in one[0] or "dehnung" in one[0]]
+
+
 def _without_per_cent_signs(table: CellTable, known: Terms) -> CellTable:
     """The table without the signs in cells such as `1.2 %`, whose columns are in per cent, as their names must say."""
     kinds, cells = known.columns.kinds, table.rows[0].cells if table.rows else ()
@@ -169,7 +182,7 @@ def _with_decided_strains(
 
 
 def _is_undecided(name: str, known: Terms) -> bool:
-    found = None if name in known.declared else split_unit(name, known.column_kinds)
+    found = None if name in known.vocabulary.synonyms else split_unit(name, known.column_kinds)
     return found == (name, "") and known.column_kinds[name].is_ambiguous_without_unit
 
 

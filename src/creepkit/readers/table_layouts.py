@@ -197,7 +197,7 @@ def rows_by_test(table: CellTable, entries: Mapping[str, SourceText], known: Ter
     foreign = [
         k
         for k, column in enumerate(table.columns)
-        if column not in known.declared and known.quantity(column) in (None, *known.length_kinds)
+        if column not in known.vocabulary.synonyms and known.quantity(column) in (None, *known.length_kinds)
     ]
     keys = [k for k in foreign if names_tests(table.columns[k])]
     if not foreign:
@@ -386,7 +386,7 @@ def _are_columns(headed: HeadedTable) -> bool:
     """Whether the columns beside one time are one a test."""
     known = headed.known
     others = [headed.names[k] for k in _columns_of_tests(headed)]
-    if len(headed.times) != 1 or len(others) < 2 or known.declared.intersection(others):
+    if len(headed.times) != 1 or len(others) < 2 or known.vocabulary.synonyms.keys() & {*others}:
         return False
     named = [test_and_column(cell, known) for cell in others]
     if all(test for test, _ in named):
@@ -519,10 +519,8 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
         what = f"{' and '.join(map(repr, axes[0]))} are columns of a plot; what are they?"
         raise column_question(headed.table, what, *choices)
     if not headed.times:
-        what = (
-            f"missing column: no time among {some_of(list(filter(None, headed.names)))}; name one time_s, time_min or"
-        )
-        raise HistoryError(f"{headed.place}: {what} time_h in that row, behind its '#' where it has one")
+        what = f"missing column: no time among {some_of(list(filter(None, headed.names)))}; name one time_s, time_min"
+        raise HistoryError(f"{headed.place}: {what} or time_h in that row, behind its '#' where it has one")
     head = HeadOfTest(headed.table, headed.known)
     for row in headed.whole:
         head.read(row)

@@ -26,6 +26,7 @@ from creepkit.readers.columns_of_tests import (
     is_number_like,
     only_text,
     quantity_of,
+    unit_of_times,
 )
 from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
@@ -232,6 +233,9 @@ class TestTable:
                 column = TestColumn()
             if kind := column.kind:
                 column = replace(column, unit=column.unit or _unit_of_cells(cells))
+                if kind is TIME and not column.unit and (unit := unit_of_times(self.notes)):
+                    self.table = self.table.assuming(f"'{quoted(written, 60)}' in {unit} by the title")
+                    column = replace(column, unit=unit)
                 if column.unit not in kind.units:
                     self.errors.append(self._wrong_unit(column, written, cells))
             elif self._tells_tests_apart(k, column, cells):

@@ -32,7 +32,7 @@ from creepkit.readers.table import (
     without_ignored,
     without_logarithms,
 )
-from creepkit.readers.vocabulary import plain_name
+from creepkit.readers.vocabulary import plain_name, unit_suffix
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
 
@@ -91,7 +91,6 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if is_labview(text):
         text = table_of_labview(text)
-    text = _with_tabs_for_bars(text)
     text, head, offset = _with_names_behind_marks(text, *_head_of(text))
     if offset == len(text):
         problem = "holds a header but no table" if any(line.strip() for line in head) else "is empty"
@@ -117,23 +116,6 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
     return without_logarithms(table)
 
 
-_RULE = re.compile(r"[|:\-\s]*$")
-
-
-def _with_tabs_for_bars(text: str) -> str:
-    """The text of a table drawn with bars, `| 0.5 | 12.2 |`, with tabs in their places and without its rules."""
-    begun = (line.strip() for line in text[:_BEGINNING].split("\n")[:_DRAWN])
-    lines = [line for line in begun if line and not is_comment(line)]
-    if len(lines) < 2 or not all(line[0] == "|" == line[-1] for line in lines[:-1]):
-        return text
-    cells = (line.strip().removeprefix("|").removesuffix("|").split("|") for line in text.split("\n"))
-    return "\n".join("" if _RULE.match("|".join(row)) else "\t".join(map(str.strip, row)) for row in cells)
-
-
-_DRAWN = 40
-"""Lines that tell whether a table is drawn with bars."""
-
-
 def _numbered(
     text: str, offset: int, first: int, comments: list[tuple[int, str]] | None = None
 ) -> Iterator[tuple[int, str]]:
@@ -155,11 +137,36 @@ def _numbered(
 
 def _rows_of_texts(numbered: Iterator[tuple[int, str]], dialect: Dialect, path: Path) -> Iterator[TableRow]:
     """The rows in which a cell holds something; HistoryError for what no table holds."""
+    above, count = "", 0
     for number, line, cells in split_lines(numbered, dialect, path):
+        if dialect.delimiter == "|" and line.strip()[0] == "|" == line.strip()[-1]:
+            cells = [] if _RULE.fullmatch(line) else cells[1:-1]
         if len(line) > MAXIMUM_CELL:
             refuse_long_cells(f"{path}:{number}", cells)
-        if cells[0] or any(cells):
+        if dialect.delimiter == " " and len(cells) < count and all(map(unit_suffix, cells)) and {*cells} != {"1"}:
+            cells = _under_names(line, above, f"{path}:{number}")
+        if any(cells):
             yield TableRow(number, cells)
+        above, count = line, len(cells)
+
+
+_RULE = re.compile(r"[|:\-\s]*")
+
+
+def _under_names(line: str, names: str, place: str) -> list[str]:
+    """The cells of a row of units, each in the column of the name above it, whose middle is nearest to its own."""
+    units, columns = (
+        [(0.5 * (one.start() + one.end()), one[0]) for one in re.finditer(r"\S+", text.expandtabs())]
+        for text in (line, names)
+    )
+    cells, at = [""] * len(columns), -1
+    for middle, unit in units:
+        nearest = min(range(len(columns)), key=lambda k: abs(columns[k][0] - middle))
+        if nearest <= at:
+            what = f"{len(units)} units below {len(columns)} names; write - below a column without a unit"
+            raise HistoryError(f"{place}: {what}")
+        cells[nearest], at = unit, nearest
+    return cells
 
 
 # ---- the head ------------------------------------------------------------------------------------------------------

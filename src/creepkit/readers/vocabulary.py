@@ -58,17 +58,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *(
-            "probentemperatur",
-            "ofen",
-            "ofentemperatur",
-            "temperatur ofen",
-            "température",
-            "température d'essai",
-            "four",
-            "temp ctrl",
-        ),
-        *("試験温度", "温度", "temp d'essai"),
+        *("probentemperatur", "ofen", "ofentemperatur", "temperatur ofen", "température", "température d'essai"),
+        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
@@ -81,7 +72,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("creep", "total creep", "total creep strain", "creep strain", "total strain", "engineering strain"),
         *("true strain", "logarithmic strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
         *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
-        *("déformation de fluage", "allongement relatif", "deformation relative", "tensile strain extensometer"),
+        *("déformation de fluage", "déformation totale", "allongement relatif", "deformation relative"),
+        "tensile strain extensometer",
     ),
     "diametral_strain": (
         *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
@@ -123,7 +115,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "gauge_length": (
         *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
         *("anfangsmesslänge", "anfangsmesslänge le", "anfangsmesslänge l0", "messbasis", "longueur utile"),
-        *("longueur de base", "longueur de référence"),
+        *("longueur de base", "longueur de référence", "longueur entre repères"),
     ),
     "outer_diameter": (
         *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
@@ -147,17 +139,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "width": ("specimen width", "breite", "probenbreite", "largeur"),
     "thickness": (
-        *(
-            "specimen thickness",
-            "wall thickness",
-            "wall",
-            "dicke",
-            "blechdicke",
-            "probendicke",
-            "wandstärke",
-            "wanddicke",
-        ),
-        *("épaisseur", "épaisseur de paroi"),
+        *("specimen thickness", "wall thickness", "wall", "dicke", "blechdicke", "probendicke", "wandstärke"),
+        *("wanddicke", "épaisseur", "épaisseur de paroi"),
     ),
     "area": (
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
@@ -200,8 +183,8 @@ SYMBOLS: Mapping[str, str] = {
 STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
     **dict.fromkeys(("true strain", "logarithmic strain"), ("strain_measure", "logarithmic")),
     "engineering strain": ("strain_measure", "engineering"),
-    **dict.fromkeys(("total strain", "gesamtdehnung"), ("includes_elastic", "yes")),
-    **dict.fromkeys(("creep strain", "kriechdehnung"), ("includes_elastic", "no")),
+    **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
+    **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
     **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), ("includes_elastic", "no")),
 }
 """{name of a column in small letters: key and text of the condition that it states}."""
@@ -396,7 +379,6 @@ class HeaderVocabulary:
 
     synonyms : {its name: ours}, for columns and conditions alike, such as {"youngs_MPa": "modulus_MPa"}.
     default_texts : {text: value} for what its files leave out; recorded in the label "assumed".
-    averaged_columns : {label: columns} whose mean over the whole test is kept as a label, such as thermocouples.
     outputs : {specimen: {output: kind}} that its files hold beside those of the registered specimens.
     end_of_test_terms : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a
         column of rupture times such a word may stand in the place of a number.
@@ -407,7 +389,6 @@ class HeaderVocabulary:
 
     synonyms: Mapping[str, str] = field(default_factory=dict)
     default_texts: Mapping[str, str] = field(default_factory=lambda: CREEP_MACHINE_DEFAULTS)
-    averaged_columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     outputs: Mapping[str, Mapping[str, QuantityKind]] = field(default_factory=dict)
     end_of_test_terms: Mapping[str, str] = field(default_factory=dict)
     labels: Collection[str] = ()
@@ -504,7 +485,7 @@ class Terms:
 
     def column(self, name: str) -> str:
         """A name of a column in creepkit's form, where it is understood."""
-        return name if name in self.declared else self.columns.standard(name)
+        return name if name in self.vocabulary.synonyms else self.columns.standard(name)
 
     def quantity(self, name: str) -> str | None:
         """The quantity of a column, None where its name means none."""
@@ -536,12 +517,6 @@ class Terms:
             or split_unit(standard, self.conditions.kinds) is not None
             or standard.startswith(("label ", "geometry "))
         )
-
-    @property
-    def declared(self) -> set[str]:
-        """Names of columns that the vocabulary declares, which mean what it says."""
-        averaged = (name for names in self.vocabulary.averaged_columns.values() for name in names)
-        return {*self.vocabulary.synonyms, *averaged}
 
     def misspelt(self, name: str) -> str:
         """The key of which an unknown name is a misspelling; "" for none."""

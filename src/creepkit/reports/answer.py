@@ -295,6 +295,8 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield adequacy.explanations[0].headline
     if adequacy.mentioned is not None:
         yield adequacy.mentioned.caution
+    if adequacy.remedies and not adequacy.explanations:
+        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
         factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
@@ -302,8 +304,6 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
         kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
         yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
-    if adequacy.remedies and not adequacy.explanations:
-        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
     yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
         yield CAUTIONS["noise unknown"]

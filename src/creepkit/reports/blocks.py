@@ -158,6 +158,10 @@ class Answer:
     units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
     brackets: str = ""
 
+    def __str__(self) -> str:
+        """The lines of a terminal."""
+        return "\n".join(_answer_lines(self))
+
 
 Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
 

@@ -28,13 +28,8 @@ ROWS, MOST_NEXT, MOST_TICKS = 8, 3, 8
 """Tests in a table, those named after the first, and labels along an axis of the map."""
 
 
-def design_text(design: Design) -> str:
-    """The next test, what it is expected to tell, the next best, and what to mind."""
-    return as_text([design_answer(design)])
-
-
 def design_details(design: Design) -> str:
-    """The same, with the best tests in a table and what else is to be said."""
+    """The answer, with the best tests in a table and what else is to be said."""
     return as_text(design_blocks(design))
 
 

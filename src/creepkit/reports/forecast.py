@@ -40,13 +40,8 @@ SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
 
 
-def forecast_text(forecast: Forecast) -> str:
-    """What was asked for, how far to trust it, and what to do next."""
-    return as_text([forecast_answer(forecast)])
-
-
 def forecast_details(forecast: Forecast) -> str:
-    """The same, with everything that is predicted of each test."""
+    """The answer, with everything that is predicted of each test."""
     return as_text(forecast_blocks(forecast))
 
 

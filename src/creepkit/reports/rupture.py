@@ -44,11 +44,6 @@ SHOWN_EFFECTS = 6
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_text(assessment: RuptureAssessment) -> str:
-    """The method, the strengths of each temperature, what to mind and what to do next."""
-    return as_text([rupture_answer(assessment)])
-
-
 def rupture_details(assessment: RuptureAssessment) -> str:
     """The verdict, then methods, strengths and checks, and the notes."""
     return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])

@@ -100,6 +100,8 @@ NEXT = {
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
+    # what nobody modelled, of usual size, takes the contradiction away; or the true stress held in place of the load
+    "remedy": "find out whether there was {remedy}: the law would then explain the tests",
     # parameters are not determined, and a bar would do it
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     # a bar would not

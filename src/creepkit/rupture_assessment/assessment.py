@@ -288,7 +288,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         """
         return write_assessment(self, path)
 
-    shown_by = "rupture.rupture_text"
+    shown_by = "rupture.rupture_answer"
     detailed_by = "rupture.rupture_details"
 
 

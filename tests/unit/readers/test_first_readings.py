@@ -238,7 +238,7 @@ def test_three_thermocouples_are_one_question(read):
     names = ('"Temperatur oben (°C)"', '"Temperatur Mitte (°C)"', '"Temperatur unten (°C)"')
     head = f'"Prüfspannung";"120";"MPa"\n"Zeit (h)";"Dehnung (%)";{";".join(names)}\n'
     with pytest.raises(
-        HistoryError, match="csv:2: 'Temperatur oben .* and 'Temperatur Mitte .* several sensors"
+        HistoryError, match="csv:2: 'Temperatur oben .* and 'Temperatur Mitte .* seem to be sensors"
     ) as said:
         read(head + "0,0;0,0;600,1;600,2;599,8\n1,0;0,1;600,1;600,1;599,9\n")
     assert not isinstance(said.value, SeveralErrors)

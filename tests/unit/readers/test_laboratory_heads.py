@@ -286,8 +286,9 @@ def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark
     beside = f"Time (h),A1 strain (%),B1 strain (%)\n1,0.1,0.2\n2,{mark},0.3\n3,0.3,0.4\n"
     head = HEAD + "# strain_measure: engineering\n# includes_elastic: no\n"
     assert [one.times.size for one in _read(tmp_path, head + beside)] == [2, 3]
-    with pytest.raises(HistoryError, match="leave the row out"):
-        _read(tmp_path, head + f"time_h,strain_pct\n1,0.1\n2,{mark}\n3,0.3\n4,0.4\n")
+    (alone,) = _read(tmp_path, head + f"time_h,strain_pct\n1,0.1\n2,{mark}\n3,0.3\n4,0.4\n")
+    assert alone.outputs["strain"].tolist() == [0.001, 0.003, 0.004]
+    assert "1 reading without a value of 'strain_pct' left out (line" in alone.labels["assumed"]
 
 
 @pytest.mark.parametrize("text", ["nan", "NaN", "inf", "none"])

@@ -104,7 +104,7 @@ def test_document_with_its_series(tmp_path: Path):
     np.testing.assert_allclose(test.outputs["strain"], [0.0, 1.25e-4, 2.125e-3, 0.025125])
     assert test.rupture_time == 61.5 * 3600
     assert (test.strain_measure, test.includes_elastic, test.loading.control) == ("engineering", False, "load")
-    assert test.labels == {"loading_strain": "0.00251", "measured_temperature_C": "950.69"}  # 7605.5 / 8
+    assert test.labels == {"loading_strain": "0.00251"}
 
 
 def test_a_folder_gives_each_test_once_and_the_series_alone_says_the_same(tmp_path: Path):

@@ -84,3 +84,76 @@ def test_a_creep_strain_that_does_not_rise_with_the_load_is_left_as_it_is(tmp_pa
     assert not history.includes_elastic
     assert history.used.all()
     assert history.outputs["strain"] == pytest.approx(CREEP, abs=1e-7)
+
+
+TWO_BARS = {"Weg 1": "elongation (mm)", "Weg 2": "elongation (mm)"}
+
+
+def _frame_with_a_pause(folder: Path, *, cold: int, lost: Sequence[int] = ()) -> ck.History:
+    """P1, whose two transducers are tilted by 8 um, and whose furnace failed during `cold` readings from 100 h on."""
+    times = np.sort(np.concatenate([TIMES, 360000.0 + 3600.0 * np.arange(1, cold + 1)]))
+    off = (times > 360000.0) & (times <= 360000.0 + 3600.0 * cold)
+    load = np.where(off, 0.0, AREA * STRESS * np.minimum(times / RAMP, 1.0))
+    strain = load / AREA / MODULUS + 2e-5 * np.maximum(times - RAMP, 0.0) ** 0.4
+    columns = (times, load, LENGTH * strain + 8e-3, LENGTH * strain - 8e-3, np.where(off, 180.0, 600.0))
+    head = "Probendurchmesser;8.00;mm\nAnfangsmesslänge;50.00;mm\n\nZeit;Kraft;Weg 1;Weg 2;Temperatur\ns;N;mm;mm;°C\n"
+    rows = _rows(columns, lambda x: f"{x:.6f}", ";").splitlines()
+    rows = [
+        ";".join([*row.split(";")[:2], "----", *row.split(";")[3:]]) if k in lost else row for k, row in enumerate(rows)
+    ]
+    (folder / "P1.csv").write_text(head + "\n".join(rows) + "\n")
+    answers = ", ".join(f'"{name} (mm)" = "{what}"' for name, what in TWO_BARS.items())
+    (folder / "tests.toml").write_text(f'["P1.csv"]\ncolumns = {{{answers}}}\n')
+    return ck.read_histories(folder / "P1.csv")[0]
+
+
+def test_two_transducers_are_asked_about_with_their_mean_first(tmp_path: Path) -> None:
+    history = _frame_with_a_pause(tmp_path, cold=0)
+    assert history.outputs["strain"] == pytest.approx(LOAD / AREA / MODULUS + CREEP, abs=1e-8)
+    assert "mean of 'Weg 1 (mm)' and 'Weg 2 (mm)' (within 0.016 mm)" in history.labels["assumed"]
+    (tmp_path / "tests.toml").unlink()
+    with pytest.raises(ck.errors.HistoryError, match="does their mean count, or one") as asked:
+        ck.read_histories(tmp_path / "P1.csv")
+    assert list(asked.value.choices[0].values()) == [*TWO_BARS.values()]  # type: ignore[attr-defined]
+
+
+def test_one_cold_reading_without_load_is_left_out_and_several_are_a_pause(tmp_path: Path) -> None:
+    """No condition of the test is that of a furnace that failed, and when it cooled down needs no answer."""
+    one, three = (_frame_with_a_pause(tmp_path, cold=cold) for cold in (1, 3))
+    assert one.temperature == pytest.approx(873.15)
+    assert one.times.size == TIMES.size
+    assert "the reading without load at 101 h left out" in one.labels["assumed"]
+    assert three.loading.program().at(np.array([3.65e5]))[0] == pytest.approx(0.0, abs=1.0)
+    assert three.temperature.at(np.array([1e5, 3.68e5, 1e6])) == pytest.approx([873.15, 453.15, 873.15])  # type: ignore[union-attr]
+
+
+def test_readings_without_a_value_are_left_out_and_listed(tmp_path: Path) -> None:
+    history = _frame_with_a_pause(tmp_path, cold=0, lost=(20, 40))
+    assert history.times.tolist() == np.delete(np.round(TIMES, 6), (20, 40)).tolist()
+    assert "2 readings without a value of 'Weg 1 (mm)' left out (line 26; 46)" in history.labels["assumed"]
+
+
+@pytest.mark.parametrize(("title", "included"), [("TOTAL STRAIN, PCT", True), ("CREEP STRAIN, PCT", False)])
+def test_a_printout_has_its_units_under_their_names_and_says_in_its_title_which_strain(
+    tmp_path: Path, title: str, included: bool
+) -> None:
+    rows = "".join(f"{k:4d}     {k * 10.0:.4E}   {0.1 + 0.01 * k:.4E}    600.8\n" for k in range(1, 9))
+    text = f" SPECIMEN 7C   STRESS 190.0 MPA   {title}\n\n  NO       TIME         STRAIN     TEMP\n"
+    (tmp_path / "RUN.dat").write_text(text + "          (HRS)        (PCT)      (C)\n" + rows)
+    (history,) = ck.read_histories(tmp_path / "RUN.dat")
+    assert history.times.tolist() == [36000.0 * k for k in range(1, 9)]
+    assert history.outputs["strain"] == pytest.approx(1e-3 + 1e-4 * np.arange(1, 9))
+    assert history.includes_elastic is included
+
+
+def test_times_to_strains_under_bare_heads_of_a_french_table_and_an_end_in_a_word(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(
+        "Tableau 4 : temps en heures pour un allongement de fluage;;;;;\nRepère;T (°C);σ (MPa);0,2 %;1 %;Rupture\n"
+        "E1;600;200;110,5;1988,5;4971\nE3;600;165;262,7;>1500;non rompue à 1500 h\nE5;625;170;67,3;349,4;arrêt\n"
+    )
+    first, second, third = ck.read_histories(tmp_path / "t.csv")
+    assert first.times.tolist() == pytest.approx([110.5 * 3600, 1988.5 * 3600])
+    assert first.rupture_time == pytest.approx(4971 * 3600)
+    assert [one.rupture_time for one in (second, third)] == [None, None]
+    assert second.unruptured
+    assert third.unruptured
