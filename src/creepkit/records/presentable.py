@@ -32,7 +32,7 @@ class NotebookCell:
 class Presentable(NotebookCell):
     """A record that prints an answer of its own, in notebooks too; one of long answers has `details()`.
 
-    shown_by : the function of creepkit.reports that gives text or Answer, for those that have no `__str__` of their own.
+    shown_by : the function of creepkit.reports that gives text or Answer, of those that have no `__str__` of their own.
     detailed_by : that of its details, where these are more than the text.
     """
 
