@@ -70,10 +70,10 @@ def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]
     yield from (f"  {one.name} in {one.unit}, a condition of the material" for one in law.conditions)
 
 
-def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str]:
+def comment_lines(lines: Iterable[str], marker: str, width: int = 100) -> list[str]:
     """Each line after a marker; whatever could end a comment, or carry it on to the next line, is taken out.
 
-    width : 0, or the longest line allowed; longer ones are broken between words.
+    width : of a line, 0 for any; longer ones are broken between words.
     """
     pieces = [printable_text(piece_text) for line in lines for piece_text in (line.splitlines() or [""])]
     return [

@@ -330,7 +330,7 @@ def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:
     yield "@StateVariable strain p;"
     yield 'p.setGlossaryName("EquivalentViscoplasticStrain");'
     for symbol, state in zip(behaviour.states, behaviour.law.states.values(), strict=True):
-        yield from comment_lines([state.meaning], f"@StateVariable real {symbol}; //")
+        yield from comment_lines([state.meaning], f"@StateVariable real {symbol}; //", 0)
         if state.limit is not None:
             span = state.limit - state.initial
             if span > 0:
@@ -349,7 +349,7 @@ def _parameters(behaviour: IntegratorBlock) -> Iterator[str]:
     table = behaviour.law.params.values()
     for (symbol, value), param in zip(behaviour.code.parameters.items(), table, strict=True):
         unit = "" if param.unit == "1" else f"{param.unit}, "
-        yield from comment_lines([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //")
+        yield from comment_lines([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //", 0)
 
 
 def _integrator_block(behaviour: IntegratorBlock) -> Iterator[str]:

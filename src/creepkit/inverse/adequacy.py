@@ -295,9 +295,9 @@ class Adequacy:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         if self.contradicting is not None:
             parts.append(str(self.contradicting))
-        where = f"; most in {self.largest}" if self.largest is not None else ""
+        where = f". Most in {self.largest}" if self.largest is not None else ""
         if self.remedies and not self.explanations:
-            where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
+            where += f". It would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         if self.explanations and not parts:
             curves = f"; curves agree with the noise ({self._p_value_text})" if self.outputs else ""
             return f"is contradicted by the rates of the tests: {self.explanation_text}{curves}"

@@ -175,7 +175,7 @@ def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, i
         )
     if MINIMUM_RATE_OUTPUT in outputs:
         return (
-            "no noise of the minimum rates is stated, and scatter between tests was estimated from them (state it in a "
-            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd)"
+            "no noise of the minimum rates is stated, and scatter between tests was estimated from them. State it in a "
+            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd"
         )
     return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"

@@ -148,7 +148,7 @@ def _remarks(test: TestForecast) -> Iterator[str]:
     """What the law misses, a measurement, what the band is made of, what is extrapolated, cautions."""
     if test.misfit is not None:
         where = f"{test.misfit.stress:.4g} MPa and {celsius_text(test.misfit.temperature, digits=0)}"
-        yield f"{_misfit_text(test.misfit)}; they are at {where}"
+        yield f"{_misfit_text(test.misfit)}. They are at {where}"
     if test.inside is not None:
         shares, whole = test.inside.share, test.inside.whole
         yield from (f"{100 * share:.0f} % of the readings of {one} lie in the band" for one, share in shares.items())

@@ -257,7 +257,7 @@ def _changed(
         return AssessmentCheck(name, None, f"the other {int(kept.sum())} tests cannot be assessed: {error}")
     if any(a is None or b is None for a, b in zip(original, repeated, strict=True)):
         lost = any(a is not None and b is None for a, b in zip(original, repeated, strict=True))
-        text = f"there is no strength at {hours:.3g} h to compare"
+        text = "there is nothing to compare"
         return AssessmentCheck(name, False if lost else None, text, f"no strength at {hours:.3g} h is left {name}")
     if not original:
         return AssessmentCheck(name, None, "no strength can be stated at the temperatures asked for")

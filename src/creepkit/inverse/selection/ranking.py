@@ -224,7 +224,7 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
             effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
             others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
         stated = f" as they are stated; {named}" if named else ""
-        return f"none of {count} laws tried explains the tests{stated}; the best, {best} ({weight}{others}), {adequacy}"
+        return f"none of {count} laws tried explains the tests{stated}. The best, {best} ({weight}{others}), {adequacy}"
     if "asked" in unmet and adequacy is not None and adequacy.explains:
         asked, more = count - len(ranking.further), len(ranking.further)
         found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"

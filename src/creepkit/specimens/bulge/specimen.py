@@ -148,7 +148,7 @@ class Bulge(FiniteElementSpecimen):
             named = (f"{n.replace('_', ' ')} {getattr(self.geometry, n):g} mm" for n in DimpleGeometry.lengths)
             lengths = f"Lengths of the dimple that a test does not state: {', '.join(named)}. "
         return (
-            f"{lengths}Boundary conditions: {held}; radial displacements are zero on the axis; the gas presses on the "
+            f"{lengths}Boundary conditions: {held}. Radial displacements are zero on the axis. The gas presses on the "
             "underside, normal to its deformed surface. Compared is what the operator of a test, by default "
             f"'{self.observation}', observes of the displacement of the top."
         )
