@@ -263,13 +263,13 @@ MOST_LAWS = 10
 """Laws with a colour of their own."""
 
 
-WIDTH, ROW, LARGEST = 8.6, 0.17, 11.0
+WIDTH, ROW, LARGEST = 8.6, 0.115, 11.0
 """Inches of the figure, of a material in it, and of its height at most."""
 
 
 def plate_size(materials: int) -> tuple[float, float]:
     """Inches of the map of so many materials."""
-    return WIDTH, min(1.4 + ROW * max(materials, 12), LARGEST)
+    return WIDTH, min(1.4 + ROW * max(materials, 18), LARGEST)
 
 
 def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
