@@ -104,7 +104,7 @@ class KnownLaw:
         if fit.nuisances:
             sd = np.array([n.prior_sd for n in fit.nuisances], float)
             problem = problem.with_nuisances(replace(nuisances, sd=sd))
-        linear = problem.linearised(fit.x, fit.residuals_of(problem))
+        linear = problem.linearised(fit.x)
         errors = UsualErrors.of(problem, linear, noise_model, len(fit.histories) + 1, of_ranking=of_ranking)
         residuals = linear.residuals.with_effects(errors.own)
         factor = CovarianceFactor.of_residuals(residuals, noise_model)
@@ -152,7 +152,7 @@ class KnownLaw:
         Derivatives to u are those at the draws, derivatives to nuisance parameters those at the estimates.
         """
         p, problem, e = self.size, self.measured, self.x[self.size :]
-        residuals, nuisances = self.fit.residuals_of(problem), problem.nuisance_parameters
+        residuals, nuisances = problem.residuals(self.fit.x), problem.nuisance_parameters
         assert residuals.jacobian is not None
         own = [k for k in range(p, self.x.size) if k not in self.shared]
         of_own = residuals.jacobian[..., own]

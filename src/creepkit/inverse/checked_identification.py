@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
 from creepkit.inverse.composite_predictor import through_for_law
+from creepkit.inverse.held_stress import with_hold_tried
 from creepkit.inverse.history_checks import length_notes, loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
@@ -67,7 +68,7 @@ def identify(
         fit = identify_law(law, histories, predictor, **how)
     else:
         fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
-    fit = sampled_where_needed(fit, surrogate)
+    fit = with_hold_tried(sampled_where_needed(fit, surrogate))
     notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories))
     return replace(fit, notes=(*fit.notes, *notes, *rig_notes(histories, settings)))
 

@@ -30,8 +30,8 @@ ROUND_TOLERANCE = 0.2
 """Of ln: rates scatter."""
 
 
-MOST_NAMED = 6
-"""Tests in a sentence."""
+MOST_NAMED, MOST_IN_A_HEADLINE = 6, 2
+"""Tests in a sentence, and in a headline."""
 
 
 MENTIONED_ODDS, VERDICT_ODDS = float(np.log(6.0)), float(np.log(50.0))
@@ -92,7 +92,8 @@ class Explanation:
             verb = "do" if len(self.tests) > 1 else "does"
             return f"{self._named_tests} {verb} not agree with the others"
         if self.kind == "two groups":
-            return self._stated_groups or "the tests are of two groups"
+            few = self._listed(MOST_IN_A_HEADLINE)
+            return self._stated_groups or f"tests are of two groups: {few} creep {np.exp(self.size):.2g} times as fast"
         return f"the {self.kind} {self._change}"
 
     @property
@@ -102,11 +103,10 @@ class Explanation:
             return self.headline + ", more than this law lets it" * (not self.is_of_curves)
         speed = f"{np.exp(self.size):.3g} times as fast"
         if self.kind == "two groups":
-            named = ", ".join(self.tests[:MOST_NAMED])
-            more = f" and {len(self.tests) - MOST_NAMED} more" if len(self.tests) > MOST_NAMED else ""
+            named = self._listed(MOST_NAMED)
             if self.label:
-                return f"{self._stated_groups} at equal conditions ({self.label}: {named}{more})"
-            return f"tests ({named}{more}) creep {speed} as the others at equal conditions: are they of one material?"
+                return f"{self._stated_groups} at equal conditions ({self.label}: {named})"
+            return f"tests ({named}) creep {speed} as the others at equal conditions: are they of one material?"
         if len(self.tests) > 1:
             factors = " and ".join(f"{factor:.3g}" for factor in self.factors)
             return f"{self._named_tests} creep {factors} times as fast as the others say{self._values_without}"
@@ -141,8 +141,10 @@ class Explanation:
             return f'identify each {key} apart (group_by = "{key}" in a study, or --only "{key}={value}")'
         if self.kind == "one test" and self.odds < VERDICT_ODDS:
             return f"check the {'temperature' if self.may_be_temperature else 'record'} of {self.tests[0]}"
-        what = "the two groups apart" if self.kind == "two groups" else f"{self._named_tests} again"
-        return f"check {what} (label, unit, thermocouple), then identify without"
+        if self.kind == "two groups":
+            few = self._listed(MOST_IN_A_HEADLINE)
+            return f"look how {few} differ (material, heat, rig), then identify each group apart"
+        return f"check {self._named_tests} again (label, unit, thermocouple), then identify without"
 
     @property
     def _stated_groups(self) -> str:
@@ -153,6 +155,10 @@ class Explanation:
         if factor < 1.0 and self.beside:
             factor, first, other = 1.0 / factor, other, first
         return f"{first} creeps {factor:.2g} times as fast as {other}" + ("" if self.beside else " do")
+
+    def _listed(self, most: int) -> str:
+        more = len(self.tests) - most
+        return ", ".join(self.tests[:most]) + (f" and {more} more" if more > 0 else "")
 
     @property
     def _named_tests(self) -> str:

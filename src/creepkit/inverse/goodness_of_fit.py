@@ -35,11 +35,8 @@ def relative_squared_error(
             f"{quoted(shapes)} and {quoted(predicted_shapes)}"
         )
     squares = sum(float(((p - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted_arrays, strict=True))
-    return (
-        squares / total_sum_of_squares(measured_arrays, about)
-        if total_sum_of_squares(measured_arrays, about) > 0
-        else float("nan")
-    )
+    total = total_sum_of_squares(measured_arrays, about)
+    return squares / total if total > 0 else float("nan")
 
 
 def total_sum_of_squares(tests: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:

@@ -22,7 +22,7 @@ from creepkit.inverse.explanation import LeftOut
 from creepkit.inverse.extrapolation import RANGE_TOLERANCE, UNSEEN_RUPTURE, warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.perturbation import Perturbation
@@ -132,12 +132,15 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
 
     @property
     def prediction_error(self) -> float:
-        """Of ln strain: root of the mean squares of what the law leaves, and of rates of tests by the others alone.
+        """Of ln strain: root of the mean squares of what curves leave at rates of their own, and of rates left out.
 
         NaN of fewer than four tests, or without strains.
         """
-        rates = [one.log_factor for one in self.left_out]
-        return float(np.hypot(self.rms, np.sqrt(np.mean(np.square(rates))))) if rates else np.nan
+        if not self.left_out:
+            return np.nan
+        own, rates = np.log([m.rate_factor for m in self.tests]), [one.log_factor for one in self.left_out]
+        shape = max(self.rms**2 - float(np.mean(own**2)), 0.0)
+        return float(np.sqrt(shape + np.mean(np.square(rates))))
 
     def to_arviz(self, *, draws: int = 1000, seed: int = 0) -> Any:
         """Draws from the posterior as an xarray Dataset, which arviz takes: one chain, with units of the parameters."""
@@ -214,14 +217,14 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         if self.settings.weights == "likelihood" and np.abs(log_factors).max() > NOTEWORTHY_FACTOR:
             problem = problem.about_rates(self.x, log_factors)
         problem = problem.about_stopped_tests(self.x, self.noise_model)
-        return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
+        return problem.with_covariance(CovarianceFactor.of_residuals(problem.residuals(self.x), self.noise_model))
 
     @property
     def linear_problem(self) -> LinearisedProblem:
         """The problem made linear at the values; of an identification from a file predicted again."""
         if self.linearised is not None:
             return self.linearised
-        return self.least_squares_problem.linearised(self.x, self.residuals_of(self.least_squares_problem))
+        return self.least_squares_problem.linearised(self.x)
 
     @property
     def scatter_of_rates(self) -> RateScatter:
@@ -232,10 +235,6 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
                 "which a prediction has no interval; identify again"
             )
         return self.rate_scatter
-
-    def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:
-        """Residuals of a problem of these tests at the optimum, with the weights of tests."""
-        return problem.residuals(self.x)
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
         """Value and 95 % interval of a quantity, of ln rate with what the law misses there; point : {name: (...,)}."""

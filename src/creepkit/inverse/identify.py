@@ -28,7 +28,6 @@ from creepkit.inverse.errors_of_tests import (
     errors_of_tests,
     with_expected_scatter,
 )
-from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
@@ -147,8 +146,8 @@ def describing(fit: Identification) -> Identification:
     Where it misses the shape of curves its likelihood is that of the misfit: values are those of frames of equal
     weight.
     """
-    missed = fit.settings.weights == "likelihood" and fit.adequacy is not None and fit.adequacy.misses_shape()
-    if not missed or fit.predictor is None:
+    adequacy = fit.adequacy
+    if fit.settings.weights != "likelihood" or adequacy is None or fit.predictor is None or not adequacy.misses_shape():
         return fit
     start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
@@ -169,23 +168,8 @@ def _without_one_test(fit: Identification) -> Identification:
     except CreepkitError:
         return fit
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
-    if len(first.tests) == 1:
-        position = [h.name for h in fit.histories].index(first.tests[0])
-        again = _beside_the_others(fit, without, position, first)
-        first = replace(again, factors=(float(np.exp(again.size)),), near=first.near)
     explanations = (replace(first, without=values), *rest)
     return replace(fit, adequacy=replace(adequacy, explanations=explanations))
-
-
-def _beside_the_others(fit: Identification, without: Identification, test: int, found: Explanation) -> Explanation:
-    """One test, by its position, beside the law of the others: the problem is made linear there and at its own rate."""
-    problem, x, log_factors = fit.least_squares_problem, fit.x.copy(), np.zeros(len(fit.histories))
-    x[: len(without.u)] = without.u
-    log_factors[test] = found.size
-    linear = problem.about_rates(x, log_factors).linearised(x)
-    others = RateExplanations(problem, x, linear, without.noise_model)
-    size = float(others.scatter.log_factor[test])
-    return others.one_test(test, found.odds, size if np.isfinite(size) else found.size)
 
 
 def _estimated(
@@ -226,6 +210,8 @@ def _estimated(
         if end is not usual and (kept := _law_of_determined(usual, end)).params != end.problem.law.params:
             is_wider = kept.params != usual.problem.law.params  # if not, nor is more told through the last predictor
             end, widenings = (within(kept, stage, usual.best), widenings) if is_wider else (usual, 0)
+        if not widenings:  # what waited for wider bounds
+            end = end._replace(best=_describing_estimate(end.best, DESCRIBING_LIMITS, how._replace(widens=False)))
         problem, starts, noise = replace(end.problem, settings=end.best.problem.settings), [end.best.x], end.best.noise
     _check_bounds(end.best)
     return end.best, outcome, end.numerical_error
@@ -240,7 +226,8 @@ def _wider_law(found: EstimationResult) -> CreepLaw | None:
 def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
     """The law within those wider bounds that the tests need, by intervals as they are reported."""
     found, estimator = end.best, _working_estimator(end.best.problem, end.numerical_error)
-    problem, linear, noise = found.problem, found.linear, estimator.final(found.linear, found.noise)
+    problem, linear = found.problem, found.linear
+    noise = estimator.final(linear, found.noise, problem.parameter_count)
     working_noise = None if estimator.by_likelihood else with_single_value_weight(found.noise, problem.observations)
     errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
     by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
@@ -264,12 +251,14 @@ class EstimationOptions(NamedTuple):
 
     is_near : whether it begins near its end. through : a cheaper predictor, which comes first. judged : the tests with
     all frames, where an end that clearly misses the shape of curves goes on with those weights that describe them.
+    widens : whether bounds are still widened, before which it waits.
     """
 
     is_near: bool
     through: Predictor | None
     judged: Sequence[History] | None
     progress: IterationCallback | None
+    widens: bool = True
 
 
 class StageEnd(NamedTuple):
@@ -337,7 +326,7 @@ def _describing_estimate(found: EstimationResult, limits: IterationLimits, how: 
     With rates that share nothing the exponent would be that of the bend of single curves.
     """
     problem, linear, noise = found.problem, found.linear, found.noise
-    if how.judged is None or problem.settings.weights != "likelihood" or _wider_law(found) is not None:
+    if how.judged is None or problem.settings.weights != "likelihood" or (how.widens and _wider_law(found)):
         return found
     if noise.rate < UNRELATED_RATES:
         if not autocorrelated_components(noise):  # the curves are followed to a white noise
@@ -384,7 +373,7 @@ def _reported(
     estimator = _working_estimator(found.problem, numerical_error)
     best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
     problem, linear, x = best.problem.with_simulated_stresses(best.x), best.linear, best.x
-    noise_model = estimator.final(linear, best.noise)
+    noise_model = estimator.final(linear, best.noise, problem.parameter_count)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
     working_noise, errors, judged = None, best.errors, linear

@@ -26,7 +26,7 @@ class StartingEstimate:
 
     u : (parameters,) conditioned coordinates about `reference`, None for a global search in these coordinates.
     nuisances : explicit nuisances as they were estimated before. values_only : whether values and intervals are all
-    that is asked for: no samples of the posterior where a value is at its bound, no refit without a test that is off.
+    that is asked for: no refit without a test that is off.
     is_near : whether it is an end of the same law by tests that hardly differ.
     """
 

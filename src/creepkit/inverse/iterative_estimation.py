@@ -47,7 +47,7 @@ about a value that is off by so much holds the truth in 92 %."""
 
 
 CONVERGED_GAIN, SMALL_STEP = 0.02, 0.2
-"""Gain of the log-likelihood, and change of a test's weight, that end the rounds; and the step of that gain, half its
+"""Gain of the log-likelihood that ends the rounds; and the step of that gain, half its
 square, in standard deviations, which is left to the last steps."""
 
 

@@ -37,7 +37,6 @@ from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.perturbation import DRIFT, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.local_refinement import least_within
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
 from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, is_logarithmic
@@ -240,12 +239,10 @@ def judged_residuals_of(fit: Identification) -> JudgedResiduals | None:
 
 
 def _marginal_contributions(residuals: Residuals, solution: LinearSolution, noise_model: NoiseModel) -> Floats:
-    """(tests, observations) whose sum over an output is its own chi-square.
+    """(tests, observations) whose sum over an output is its own chi-square, as if it alone were known.
 
-    That of outputs whose noise is correlated is not a sum of theirs: each is then taken as if it alone were known.
+    Outputs share the rate of a test, and their noise may be correlated: that of all together is not a sum of theirs.
     """
-    if residuals.shared_noise is None:
-        return solution.residuals * solution.weighted_residuals
     out = np.zeros_like(solution.residuals)
     for position in range(len(noise_model.outputs)):
         mask = residuals.present & (residuals.output_index == position)
@@ -255,19 +252,9 @@ def _marginal_contributions(residuals: Residuals, solution: LinearSolution, nois
 
 
 def _within_bounds(linear: LinearisedProblem, factor: CovarianceFactor) -> LinearSolution:
-    """The optimum of the linear problem within its bounds, or the point itself where the step gains nothing."""
-    solution, residuals = linear.solve(factor), linear.residuals
-    present = residuals.present
-    columns = np.concatenate([linear.jacobian, residuals.values[..., None]], axis=-1)
-    whitened = factor.whiten(columns)[present]
-    root_prior = np.sqrt(linear.precision[linear.free])
-    priors = np.column_stack([np.diag(root_prior), root_prior * linear.prior_residual[linear.free]])
-    low, high = linear.step_bounds[:, linear.free]
-    step = least_within(np.concatenate([whitened, priors]), np.minimum(low, 0.0), np.maximum(high, 0.0))
-    moved = residuals.values + linear.jacobian @ step
-    candidates = [(values, factor.inverse_times(values)) for values in (moved, residuals.values)]
-    values, weighted = min(candidates, key=lambda pair: float((pair[0] * pair[1]).sum()))
-    return replace(solution, residuals=values, weighted_residuals=weighted)
+    """The optimum of the linear problem within its bounds."""
+    residuals = linear.residuals.values + linear.jacobian @ linear.step_within(factor)
+    return replace(linear.solve(factor), residuals=residuals, weighted_residuals=factor.inverse_times(residuals))
 
 
 def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:

@@ -192,7 +192,7 @@ def _key(law: Any, histories: Any, predictor: Predictor, how: Mapping[str, Any])
         if start is None
         else [
             None if start.u is None else np.asarray(start.u).tolist(),
-            repr([start.nuisances, start.reference, start.values_only]),
+            repr([start.nuisances, start.reference, start.values_only, start.is_near]),
         ],
     }
     return short_hash(canonical_json(parts))

@@ -152,14 +152,6 @@ def _variance_of_f(freedom: float, noise_freedom: float) -> float:
     return 2.0 * nu**2 * (freedom + nu - 2.0) / (freedom * (nu - 2.0) ** 2 * (nu - 4.0))
 
 
-def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> float:
-    """Probability of a larger reduced chi-square by chance, the noise known to `noise_freedom` degrees of freedom."""
-    if not (np.isfinite(reduced) and freedom > 0):
-        return float("nan")
-    distribution, scale = _distribution_of_reduced(freedom, max(noise_freedom, 1.0))
-    return float(distribution.sf(reduced / scale))
-
-
 def _distribution_of_reduced(freedom: float, noise_freedom: float) -> tuple[Any, float]:
     """A distribution of scipy, and a scale of it: chi-square over its degrees of freedom, or F."""
     return (chi2(freedom), 1.0 / freedom) if np.isinf(noise_freedom) else (f(freedom, noise_freedom), 1.0)

@@ -301,10 +301,7 @@ class LeastSquaresProblem:
         return self._about_rates(values), np.where(present[..., None], jacobian, 0.0)
 
     def linearised(self, x: Floats, residuals: Residuals | None = None) -> LinearisedProblem:
-        """The problem made linear at x (unknowns,), (u, e): weak priors of the bounds on u, their own on e.
-
-        residuals : there, with the weights of tests.
-        """
+        """The problem made linear at x (unknowns,), (u, e): weak priors of bounds on u, their own on e."""
         nuisances, bounds, count = self.nuisance_parameters, self.bounds, self.parameter_count
         precision = np.concatenate([12.0 / bounds.width[:count] ** 2, nuisances.precision])
         prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])

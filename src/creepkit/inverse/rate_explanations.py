@@ -142,10 +142,6 @@ class RateExplanations:
             out.append(LeftOut(history.name, float(evidence.mean[0]), float(evidence.sd[0]), exponent))
         return tuple(out)
 
-    def one_test(self, test: int, odds: float, size: float) -> Explanation:
-        """That of one test by its position; size : of ln of its factor."""
-        return self._one_test(test, replace(self._alone[test], mean=np.array([size])), odds)
-
     def _evidence(self, columns: Sequence[Floats], prior_sd: Sequence[float]) -> Evidence:
         weights = np.stack(columns, axis=1) if columns else np.zeros((len(self.problem.histories), 0))
         return self.scatter.evidence(weights, np.array(prior_sd, float))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, minimize
+from scipy.optimize import OptimizeResult, lsq_linear, minimize
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
@@ -66,6 +66,17 @@ class LinearisedProblem:
         log_det = -float(np.linalg.slogdet(covariance)[1])
         return LinearSolution(step, residuals, weighted_residuals, weighted[..., 1:], covariance, chi2, log_det)
 
+    def step_within(self, factor: CovarianceFactor) -> Floats:
+        """(free unknowns,) the step to the optimum within the bounds, or none where it gains nothing."""
+        whitened = factor.whiten(np.concatenate([self.jacobian, self.residuals.values[..., None]], axis=-1))
+        root_prior = np.sqrt(self.precision[self.free])
+        rows = np.column_stack([np.diag(root_prior), root_prior * self.prior_residual[self.free]])
+        rows = np.concatenate([whitened[self.residuals.present], rows])
+        low, high = self.step_bounds[:, self.free]
+        step = least_within(rows, np.minimum(low, 0.0), np.maximum(high, 0.0))
+        gains = np.linalg.norm(rows[:, :-1] @ step + rows[:, -1]) < np.linalg.norm(rows[:, -1])
+        return step if gains else np.zeros_like(step)
+
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
@@ -83,6 +94,21 @@ class LinearSolution:
     covariance: Floats
     chi_square: float
     log_det: float
+
+
+def least_within(rows: Floats, low: Floats, high: Floats) -> Floats:
+    """(unknowns,) step of least squares within bounds.
+
+    rows : (rows, unknowns + 1) derivatives, then values. low, high : (unknowns,) of the step.
+    """
+    step, moves = np.zeros(low.size), high > low
+    size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-150)[moves]
+    matrix, low, high = rows[:, :-1][:, moves] / size, low[moves] * size, high[moves] * size
+    best = np.linalg.lstsq(matrix, -rows[:, -1], rcond=1e-12)[0]
+    if ((best < low) | (best > high)).any():
+        best = np.clip(lsq_linear(matrix, -rows[:, -1], (low, high), method="bvls", tol=1e-12).x, low, high)
+    step[moves] = best / size
+    return step
 
 
 def restricted_log_likelihood(

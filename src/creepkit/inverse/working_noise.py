@@ -95,8 +95,11 @@ class WorkingNoiseEstimator:
         """Where the iteration begins: the guess, or for a likelihood all sources of scatter at a tenth."""
         return self._likely_start(tests) if self.by_likelihood else self.initial()
 
-    def final(self, linearised: LinearisedProblem, working_noise: NoiseModel) -> NoiseModel:
-        """The noise model of largest restricted likelihood at the end: the working noise itself where values are."""
+    def final(self, linearised: LinearisedProblem, working_noise: NoiseModel, parameters: int) -> NoiseModel:
+        """The noise model of largest restricted likelihood at the end: the working noise itself where values are.
+
+        parameters : of the law, the first unknowns.
+        """
         if self.by_likelihood:
             return working_noise
         start = self._likely_start(len(linearised.residuals.values))
@@ -104,7 +107,8 @@ class WorkingNoiseEstimator:
         if found.rate < UNRELATED_RATES:
             return found
         # rates that share nothing set values free to follow the bend of curves: the noise is that about these values
-        return self._by_restricted_likelihood(replace(linearised, free=np.zeros_like(linearised.free)), start)
+        held = np.arange(linearised.free.size) < parameters
+        return self._by_restricted_likelihood(replace(linearised, free=linearised.free & ~held), start)
 
     def _likely_start(self, tests: int) -> NoiseModel:
         nuisances, by_output = self.settings.nuisances, {}

@@ -74,8 +74,8 @@ class History(Measured):
     outputs : {name: (frames,)}; uniaxial: "strain", equivalent creep strain as `strain_measure` says.
     loading : what was imposed.
     temperature : K, a number or a Program.
-    strain_measure : "logarithmic" or "engineering" (the observation operator of a uniaxial strain).
-    includes_elastic : whether the strain contains the elastic strain on loading.
+    strain_measure : "logarithmic" or "engineering" (the observation operator of a uniaxial strain); files that state
+        none hold engineering strains. includes_elastic : whether the strain contains the elastic strain on loading.
     standard_deviation : {output: (frames,)} of the noise, where it is known, in the unit of the output.
     used : (frames,) which frames a fit may use; EVERY_FRAME stands for all of them.
     operator : which observation operator, and window, made the outputs (empty: the specimen's default).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
@@ -107,6 +107,14 @@ def held_of(loading: Loading) -> Literal["load", "stress"]:
     return "stress" if getattr(loading, "control", "load") == "stress" else "load"
 
 
+def held_otherwise(loading: Loading) -> tuple[Loading, Literal["load", "stress"]] | None:
+    """A loading of a stress that holds the load in place of the true stress, or the reverse, and which; or None."""
+    if not isinstance(loading, StressSteps | RecordedLoading) or loading.quantity != "stress":
+        return None
+    other: Literal["load", "stress"] = "load" if loading.control == "stress" else "stress"
+    return replace(loading, control=other), other
+
+
 @checked
 @dataclass(frozen=True)
 class StressSteps:
@@ -133,7 +141,10 @@ class StressSteps:
 
 @checked
 def constant_stress(stress: float, control: Literal["load", "stress"] = "load") -> StressSteps:
-    """One stress, MPa, held from time zero."""
+    """One stress, MPa, from time zero: nominal under a constant load, as most rigs hold it, unless control = "stress".
+
+    control : "load": the force is held, and the true stress grows as exp(strain); "stress": the true stress is held.
+    """
     return StressSteps(((0.0, stress),), control)
 
 

@@ -94,7 +94,8 @@ def headline(fit: Identification) -> str:
     contradicted = adequacy is not None and adequacy.rejects and not adequacy.lies_in_tests
     kind = f"{'between' if contradicted else 'use'}{' in part' * bool(bad)}"
     kind = kind if good else "use nothing" if bad else "fitted"
-    return HEADLINES[kind if fit.converged else "not found"].format(**values)
+    found = fit.converged or (adequacy is not None and adequacy.lies_in_tests)  # a cause goes before the search
+    return HEADLINES[kind if found else "not found"].format(**values)
 
 
 def tested_range(fit: Identification) -> str:

@@ -24,11 +24,14 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     """What to do now, in one sentence without a full stop. searched : names of laws that a search of laws tried."""
     adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
     names, laws = named(weak, "parameter"), [] if ranking is None else [r.fit for r in ranking.laws]
-    if not fit.converged:
+    in_tests = None if adequacy is None else adequacy.in_tests
+    if not fit.converged and not (adequacy is not None and adequacy.lies_in_tests):
         bounds = f" and bounds for {names}" if weak else ""
         return NEXT["search"].format(starts=2 * fit.settings.starts, bounds=bounds)
-    if adequacy is not None and adequacy.in_tests is not None:
-        return adequacy.in_tests.next_step
+    if in_tests is not None:
+        return in_tests.next_step
+    if adequacy is not None and adequacy.remedies:
+        return NEXT["remedy"].format(remedy=adequacy.remedies[0])
     if adequacy is not None and adequacy.rejects:
         if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])

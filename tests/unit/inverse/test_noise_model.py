@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import f
 
-from creepkit.inverse.known_noise import KnownNoise, chance_of_larger
+from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components
 from creepkit.inverse.observation_vector import ObservationVector
@@ -195,7 +195,6 @@ def test_one_test_has_the_distribution_of_f_and_several_about_the_nominal_chance
     """Nine tests of 60 white frames, each over its own variance of 12 degrees of freedom; 1 % of 4000 draws."""
     one = KnownNoise(np.ones((1, 60), bool), np.ones((1, 60)), np.full((1, 60), 12.0))
     assert one.chance_of_larger(1.5, 0.9, one.judged) == pytest.approx(f.sf(1.5, 54.0, 12.0))
-    assert chance_of_larger(1.5, 54.0, 12.0) == pytest.approx(f.sf(1.5, 54.0, 12.0))
     nine = KnownNoise(np.ones((9, 60), bool), np.ones((9, 60)), np.full((9, 60), 12.0))
     rng = np.random.default_rng(0)
     draws = (rng.chisquare(60, (4000, 9)) / 60 / (rng.chisquare(12, (4000, 9)) / 12)).mean(axis=1)

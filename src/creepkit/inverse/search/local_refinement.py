@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.variance_components import least_within
 
 IterationCallback = Callable[[str, int, int], None]
 """Reports the progress of a search: (name of the step, how many are done, how many there are)."""
@@ -124,21 +124,6 @@ MOST_CHANGES = 20
 
 def _squares_above(limits: Floats) -> float:
     return float((np.maximum(limits, 0.0) ** 2).sum())
-
-
-def least_within(rows: Floats, low: Floats, high: Floats) -> Floats:
-    """(unknowns,) step of least squares within bounds.
-
-    rows : (rows, unknowns + 1) derivatives, then values. low, high : (unknowns,) of the step.
-    """
-    step, moves = np.zeros(low.size), high > low
-    size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-150)[moves]
-    matrix, low, high = rows[:, :-1][:, moves] / size, low[moves] * size, high[moves] * size
-    best = np.linalg.lstsq(matrix, -rows[:, -1], rcond=1e-12)[0]
-    if ((best < low) | (best > high)).any():
-        best = np.clip(lsq_linear(matrix, -rows[:, -1], (low, high), method="bvls", tol=1e-12).x, low, high)
-    step[moves] = best / size
-    return step
 
 
 def robust_loss(squared: Floats) -> Floats:

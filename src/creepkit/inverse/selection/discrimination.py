@@ -74,10 +74,8 @@ def under_common_covariance(
     plain = problems = [fit.linear_problem for fit in fits]
     if errors:
         problems = [linear.with_effects(own) for linear, own in zip(plain, errors, strict=True)]
-    own_scores = [
-        _score_under_own_covariance(fit, linear, effective_sample_size(without.residuals, fit.noise_model))
-        for fit, linear, without in zip(fits, problems, plain, strict=True)
-    ]
+    frames = max(effective_sample_size(one.residuals, fit.noise_model) for fit, one in zip(fits, plain, strict=True))
+    own_scores = [_score_under_own_covariance(fit, one, frames) for fit, one in zip(fits, problems, strict=True)]
     reference_law = int(np.argmin(own_scores))
     noise_model, reference_residuals = fits[reference_law].noise_model, plain[reference_law].residuals
     factors = [
@@ -88,9 +86,11 @@ def under_common_covariance(
         _optimum_under(linear, factor, len(fit.u)) for linear, factor, fit in zip(problems, factors, fits, strict=True)
     ]
     chi_squares, log_determinants, whitened, steps = zip(*results, strict=True)
+    stopped = [linear.residuals.stopped for linear in problems]
     return CommonCovarianceFits(
-        np.add(chi_squares, [linear.residuals.stopped.chi_square for linear in problems]),
-        np.add(log_determinants, [factor.log_determinant for factor in factors]),
+        np.add(chi_squares, [one.chi_square for one in stopped]),
+        np.add(log_determinants, [factor.log_determinant for factor in factors])
+        + [one.log_variance for one in stopped],
         effective_sample_size(reference_residuals, noise_model),
         reference_law,
         np.array(whitened),
@@ -132,17 +132,10 @@ def _optimum_under(
     precision = linearised.precision.copy()
     precision[:parameter_count] = 1e-9 * precision[:parameter_count]
     without_parameter_priors = replace(linearised, precision=precision)
-    newton_step = np.zeros(precision.size)
-    newton_step[linearised.free] = without_parameter_priors.solve(factor).step
-    newton_step = np.clip(newton_step, *linearised.step_bounds)
-    best = min(
-        (
-            (*_chi_square(without_parameter_priors, factor, candidate_step), candidate_step)
-            for candidate_step in (newton_step, np.zeros_like(newton_step))
-        ),
-        key=lambda end: end[0],
-    )
-    return best[0], _nuisance_log_determinant(linearised, factor, parameter_count), *best[1:]
+    step = np.zeros(precision.size)
+    step[linearised.free] = without_parameter_priors.step_within(factor)
+    chi_square, whitened = _chi_square(without_parameter_priors, factor, step)
+    return chi_square, _nuisance_log_determinant(linearised, factor, parameter_count), whitened, step
 
 
 def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:

@@ -15,6 +15,7 @@ from creepkit.errors import CreepkitError, FitError, LawError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
+from creepkit.inverse.held_stress import with_hold_tried
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import describing, identify, sampled_where_needed
 from creepkit.inverse.initial_search import StartingEstimate
@@ -74,7 +75,11 @@ def select(
         pairs = sums_of_two([fit.law for fit in fits])
         fits += _identify_all(pairs, histories, using, settings, through, progress, failed, "sum")
     elif fits and sums is None:
-        richer = _richer_laws(rank(fits, challenge=False), histories)[: settings.further_laws]
+        ranking = rank(fits, challenge=False)
+        best = with_hold_tried(ranking.best)
+        fits = [best if fit is ranking.best else fit for fit in fits]
+        ranking = replace(ranking, laws=(replace(ranking.laws[0], fit=best), *ranking.laws[1:]))
+        richer = _richer_laws(ranking, histories)[: settings.further_laws]
         fits += _identify_all(richer, histories, using, settings, through, progress, failed, "further law")
         tried_further = tuple(law.name for law in richer if law.name not in failed)
     if not fits:
@@ -108,7 +113,7 @@ def _repeated(fit: Identification, using: Any, settings: IdentificationSettings,
 def as_shown(fit: Identification, asked: IdentificationSettings, through: Predictor | None) -> Identification:
     """What is shown of a law that may be the one: values that describe the tests, and samples where they are needed."""
     fit = describing(fit) if asked.weights != "likelihood" else fit
-    return sampled_where_needed(fit, through)
+    return with_hold_tried(sampled_where_needed(fit, through))
 
 
 def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:

@@ -39,7 +39,7 @@ def predicted_errors(fit: Identification, alone: CovarianceFactor) -> Floats:
     values by likelihood, under the errors that the intervals include, have under C.
     """
     problem, noise = fit.least_squares_problem, fit.noise_model
-    linear = problem.linearised(fit.x, fit.residuals_of(problem))
+    linear = problem.linearised(fit.x)
     residuals = linear.with_errors(errors_of_tests(problem, fit.x, linear, noise)).residuals
     whole = CovarianceFactor.of_residuals(residuals, with_expected_scatter(problem, linear, noise))
     rest = (alone.blocks @ whole.inverse_times(residuals.values)[..., None])[..., 0]
@@ -156,7 +156,7 @@ class Posterior:
     def from_identification(cls, fit: Identification) -> Posterior:
         """The posterior of an identification, about its optimum, given what the errors of its tests are there."""
         problem, noise_model = fit.least_squares_problem, fit.noise_model
-        residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
+        residuals, nuisances, count = problem.residuals(fit.x), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
         e = fit.x[count:]
         factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))

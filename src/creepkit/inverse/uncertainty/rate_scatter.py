@@ -321,13 +321,6 @@ class ScatterPosterior:
             return 0.0
         return float(self.weight @ self.sd[:, self.levels.index(level)] ** 2)
 
-    def median(self, level: str) -> float:
-        """Median standard deviation of a level."""
-        values = self.sd[:, self.levels.index(level)]
-        order = np.argsort(values)
-        cumulative = np.cumsum(self.weight[order])
-        return float(values[order][min(int(np.searchsorted(cumulative, 0.5)), values.size - 1)])
-
 
 def log_prior(sd: Floats, levels: Sequence[str], reach: float = 1.0) -> Floats:
     """(...,) ln of the prior density of ln of standard deviations sd (..., levels), but for a constant."""

@@ -378,3 +378,25 @@ def test_a_law_that_misses_the_shape_of_curves_is_ranked_by_likelihood_and_takes
     lives = [[t.rupture for t in found.best.tests] for found in both]
     errors = [np.median([abs(np.log(one.predicted / one.measured)) for one in of_law]) for of_law in lives]
     assert errors[1] < 0.04 < 0.09 < errors[0]
+
+
+def test_run_outs_that_every_law_expects_do_not_rank_them():
+    """Two tests stopped at a third of their lives, by both laws, say of them what tests say that were never made."""
+    rng, tests = np.random.default_rng(3), []
+    for stress in (50.0, 50.0, 100.0, 105.0, 110.0, 115.0, 120.0, 125.0):
+        life, (late, fast) = 1e7 * (stress / 60.0) ** -7.0, rng.standard_normal(2)
+        stopped = stress < 60.0
+        time, end = life * (0.35 if stopped else np.exp(0.2 * late)), {"unruptured": True}
+        end = end if stopped else {"rupture_time": time}
+        rate = 0.05 / life * np.exp(0.1 * fast)
+        name, loading = f"t{len(tests)}", ck.constant_stress(stress)
+        tests.append(ck.History(name, np.array([time]), {}, loading, 1073.0, minimum_rate=rate, **end))
+    laws = [ck.law("kachanov-rabotnov").fix(chi=chi, phi=5.0, alpha=1.0, m=0.0) for chi in (7.0, 6.2)]
+    how = {"starts": 1, "usual_errors": "none", "weights": "likelihood"}
+
+    def lead(tests):
+        ranking = rank([ck.identify(law, tests, **how) for law in laws], challenge=False)
+        excess = {one.fit.law.name: one.excess for one in ranking.laws}
+        return excess[laws[0].name] - excess[laws[1].name]
+
+    assert lead(tests) == pytest.approx(lead(tests[2:]), abs=1.0)

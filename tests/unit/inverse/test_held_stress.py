@@ -1,0 +1,43 @@
+"""What a rig held, the load or the true stress, told apart by the shape of curves."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+
+RATE, N, NOISE = 2e-9, 4.2, 2e-5
+STRESSES = (100.0, 125.0, 150.0, 180.0)
+
+
+def strain(stress, times, held):
+    """Creep strain of a rate A s^n in closed form: r t under a true stress, -ln(1 - n r t) / n under a load."""
+    grown = RATE * (stress / 100.0) ** N * times
+    return grown if held == "stress" else -np.log1p(-N * grown) / N
+
+
+def bars(held, stated, seed=3):
+    """Bars under what was held, which state something else or the same."""
+    rng, tests = np.random.default_rng(seed), []
+    for stress in STRESSES:
+        times = np.linspace(0.0, 0.12 / (RATE * (stress / 100.0) ** N), 61)[1:]
+        noise = NOISE * rng.standard_normal(times.size)
+        outputs, loading = {"strain": strain(stress, times, held) + noise}, ck.constant_stress(stress, stated)
+        tests.append(ck.History(f"{stress:g} MPa", times, outputs, loading, 873.15))
+    return tests
+
+
+@pytest.mark.parametrize(("held", "stated"), [("stress", "load"), ("load", "stress")])
+def test_what_was_held_is_a_remedy_where_it_explains_the_curves(held, stated):
+    fit = ck.identify("norton", bars(held, stated))
+    assert fit.adequacy.rejects
+    assert f"(control = {held})" in fit.adequacy.remedies[0]
+    assert f"(control = {held})" in str(fit)
+    assert ck.select(["norton"], bars(held, stated)).further == ()  # no richer law, whose exponents mimic it
+
+
+@pytest.mark.parametrize("held", ["stress", "load"])
+def test_what_is_stated_rightly_has_no_remedy(held):
+    fit = ck.identify("norton", bars(held, held))
+    assert fit.adequacy.explains
+    assert fit.adequacy.remedies == ()
+    assert fit.values["n"] == pytest.approx(N, abs=0.02)
