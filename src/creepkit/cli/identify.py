@@ -10,7 +10,7 @@ import typer
 import creepkit as ck
 from creepkit.cli.command_options import OutputPath
 from creepkit.cli.identified_folder import check_identified_folder, write_ranking
-from creepkit.cli.shared import Files, Json, Only, Reader, Workers, selected
+from creepkit.cli.shared import Files, Json, Only, Reader, Workers, selected, show
 from creepkit.errors import FitError
 from creepkit.inverse.candidate_laws import LawChanges, SearchOptions
 from creepkit.inverse.settings import IdentificationSettings
@@ -181,7 +181,7 @@ def _screen(
     as_json: bool,
 ) -> None:
     """Identify every alloy by itself, and write the plate."""
-    from creepkit.reports.screening import print_screening
+    from creepkit.reports.screening import plate_to_json
 
     with ProgressBar() as progress:
         plate = ck.screen(
@@ -192,7 +192,7 @@ def _screen(
     if plate.identified:
         plate.plot(to / "plate.png")
         written += [to / "fits", to / "plate.png"]
-    print_screening(plate, written, as_json)
+    show(plate, lambda one: plate_to_json(one, written), as_json=as_json, written=written)
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:

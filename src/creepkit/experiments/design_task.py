@@ -89,23 +89,12 @@ class DesignTask:
 
     @property
     def obstacle(self) -> str:
-        """Why no test can help to tell laws apart, in a sentence; "" where one may, or where it is not asked for."""
-        best = self.laws[0]
+        """Why no test can help to tell laws apart, as a Design has it; "" where one may, or it is not asked for."""
         if self.goal != "law":
             return ""
-        if best.adequacy is not None and best.adequacy.rejects:
-            return (
-                f"no test is proposed: {best.law.name}, the best law, does not explain the tests that were made; find "
-                "a law that does, or take the goal 'parameters'"
-            )
-        if len(self.laws) > 1 or self.altered:
-            return ""
-        challenges = (self.ranking.challenges or ()) if self.ranking is not None else ()
-        doubt = "".join(f"; but {one}" for one in challenges if one.kind == "unmodelled effect")
-        return (
-            f"one law remains, {best.law.name}, and nothing is to be told apart from it{doubt}; tests are proposed for "
-            "the goal 'parameters', or for a quantity such as the rate at a stress"
-        )
+        if self.laws[0].adequacy is not None and self.laws[0].adequacy.rejects:
+            return "contradicted"
+        return "" if len(self.laws) > 1 or self.altered else "one law"
 
 
 def _ranking_of(source: Ranking | Sequence[Identification]) -> Ranking:

@@ -102,14 +102,14 @@ class TestForecast:
         """Name of the test."""
         return self.history.name
 
-    def extrapolated(self, time: TimeForecast | None = None) -> str:
-        """In which quantities a time, or by default the end of the test, is extrapolated; "" if in none."""
+    def extrapolated_in(self, time: TimeForecast | None = None) -> list[str]:
+        """The quantities in which a time, or by default the end of the test, is extrapolated."""
         names = extrapolated_names(self.extrapolation)
         if time is not None:  # how long the test goes on, and the strain that it ends at, are not of this time
             own = "time" if f"{time.event} after" in self.extrapolation else "strain" if time.output else "rupture"
             names = [name for name in names if name not in ("time", "strain")]
             names += [own] if f"{time.event} " in self.extrapolation else []
-        return f"extrapolated beyond the tests in {' and '.join(names)}" if names else ""
+        return names
 
 
 def forecast_test(

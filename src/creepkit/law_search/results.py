@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.law_search.grammar import operations
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +63,6 @@ class LawSearch(Presentable, Plotted, Tabulated):
         return front_of(self.tried)
 
     drawn_by = "law_search.front_figure", "law_search.draw_front"
-
-    def plot_front(self, ax: Axes) -> Figure:
-        """Misfit against complexity in axes of matplotlib: all laws, the front, and names of the ranked ones."""
-        return self.plot(ax=ax)
 
     def __repr__(self) -> str:
         return f"<LawSearch: {len(self.tried)} sentences, best {self.best.law.name}>"

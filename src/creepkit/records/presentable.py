@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def function_of_reports(name: str) -> Callable[..., Any]:
-    """A function of the layer above by its module and name, such as "forecast.forecast_text"."""
+    """A function of the layer above by its module and name, such as "forecast.forecast_answer"."""
     module, _, function = name.rpartition(".")
     found: Callable[..., Any] = getattr(import_module(f"creepkit.reports.{module}"), function)
     return found
@@ -32,7 +32,7 @@ class NotebookCell:
 class Presentable(NotebookCell):
     """A record that prints an answer of its own, in notebooks too; one of long answers has `details()`.
 
-    shown_by : the function of creepkit.reports that gives the text, for those that have no `__str__` of their own.
+    shown_by : the function of creepkit.reports that gives text or Answer, of those that have no `__str__` of their own.
     detailed_by : that of its details, where these are more than the text.
     """
 

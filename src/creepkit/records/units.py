@@ -159,7 +159,7 @@ def hours_number(seconds: float) -> str:
     """A time in h as a number for people: "later" than anything where infinite, "?" where not known."""
     if math.isnan(seconds):
         return "?"
-    return f"{seconds / SECONDS_PER_HOUR:.4g}" if math.isfinite(seconds) else "later"
+    return f"{float(f'{seconds / SECONDS_PER_HOUR:.4g}'):.7g}" if math.isfinite(seconds) else "later"
 
 
 def times_text(first: float, last: float) -> str:

@@ -14,7 +14,6 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
-from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
@@ -24,12 +23,12 @@ from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
-from creepkit.records.units import celsius_text, time_text
+from creepkit.records.units import celsius_text, hours_number, time_text
 from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
 from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import BRACKETS, CAUTIONS
+from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -100,7 +99,7 @@ class KeyFigure:
 
 def _written_out(value: float, digits: int) -> str:
     """A number without a power of ten where it has a usual size, such as 2930 h."""
-    if not 1e3 <= abs(value) < 1e5:
+    if not 1e3 <= abs(value) < 1e6:
         return number(value, digits)
     return f"{float(f'{value:.{digits}g}'):.0f}"
 
@@ -118,8 +117,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), by_rates]
-        return [*(one for one in found if math.isfinite(one.value)), *_lives(fit)]
+        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), *_lives(fit)]
+        return [one for one in (*found, by_rates) if math.isfinite(one.value)]
     r = fit.tested_point
     of_state = ""
     if depends_on_history(fit.law):
@@ -132,7 +131,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
-    return [*figures, _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included), *_lives(fit)]
+    rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
+    return [figures[0], *_lives(fit), *figures[1:], rate_figure]
 
 
 def _lives(fit: Identification) -> list[KeyFigure]:
@@ -179,11 +179,18 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     reached = [one for one in test.times if math.isfinite(one.median)]
     life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
     wanted = [*([one for one in reached if one.output] if times else ()), *life]
-    for one in wanted:
-        hours, label = (one.median, one.low, one.high), f"time to {event_text(one)}"
-        yield _with_interval(label, where, hours, 1 / SECONDS_PER_HOUR, "h", test.extrapolated(one))
-    if not wanted:
-        yield from [replace(one, where=where, remark=test.extrapolated()) for one in end_figures(test)][:1]
+    for figure, one in [(time_figure(one), one) for one in wanted] or [(one, None) for one in end_figures(test)][:1]:
+        beyond = test.extrapolated_in(one)
+        said = [FORECAST["beyond"].format(quantities=listed(beyond))] * bool(beyond)
+        yield replace(figure, where=where, remark=", ".join(filter(None, [figure.remark, *said])))
+
+
+def time_figure(one: TimeForecast) -> KeyFigure:
+    """When something comes; of a measured test whether it did within its interval."""
+    inside = {True: "inside", False: "outside", None: ""}[one.inside]
+    said = f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}" * math.isfinite(one.measured)
+    hours = (one.median, one.low, one.high)
+    return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", said)
 
 
 def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
@@ -513,7 +520,8 @@ def interval_text(values: Sequence[float], unit: str = "") -> str:
 
     The value alone where an end is not known; an end that is infinite in words.
     """
-    known, behind = not any(map(math.isnan, values[1:])), f" {unit}" if unit else ""
+    known = not (any(map(math.isnan, values[1:])) or math.isinf(values[1]))
+    behind = f" {unit}" if unit and not math.isinf(values[0]) else ""
     digits = interval_digits(*values) if known else 2
     value, low, high = (_written_out(v, digits) if not math.isinf(v) else BEYOND.get(unit, "no limit") for v in values)
     return f"{value}{behind} [{low}, {high}]" if known else f"{value}{behind}"
@@ -536,12 +544,5 @@ def constant_load_sentence(fit: Identification) -> str:
     of_stress = [h for h in fit.histories if "strain" in h.outputs and h.loading.quantity == "stress"]
     if not any(held_of(h.loading) == "load" for h in of_stress):
         return ""
-    growth = fit.ranges["strain"][1]
-    scatter = fit.noise_model.rate
-    beside = f"rates of single tests scatter by {100 * scatter:.2g} % (one standard deviation)"
-    if scatter <= UNDETECTED_SCATTER:
-        beside = f"scatter of rates between tests {'was not detected' if scatter > 0 else 'is not known'}"
-    return (
-        f"under a constant load the true stress rises with strain, here by up to {100 * growth:.2g} %: the interval of "
-        f"the stress exponent rests on the form of the law too; {beside}"
-    )
+    growth = f"{100 * fit.ranges['strain'][1]:.2g} %"
+    return CONSTANT_LOAD.format(growth=growth)

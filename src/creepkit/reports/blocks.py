@@ -12,7 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from textwrap import wrap
+from textwrap import TextWrapper, wrap
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
@@ -158,6 +158,10 @@ class Answer:
     units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
     brackets: str = ""
 
+    def __str__(self) -> str:
+        """The lines of a terminal."""
+        return "\n".join(_answer_lines(self))
+
 
 Block: TypeAlias = Answer | Paragraph | Items | Table | Picture | Formula | Verbatim | Downloads
 
@@ -289,13 +293,13 @@ def _lines(block: Block) -> list[str]:
     if isinstance(block, Answer):
         return _answer_lines(block)
     if isinstance(block, Paragraph):
-        return [f"warning: {block.text}" if block.role == "warning" else block.text]
+        return _indented(f"warning: {block.text}" if block.role == "warning" else block.text, "")
     if isinstance(block, Items):
-        return [f"- {item}" for item in block.items]
+        return [line for item in block.items for line in _indented(f"- {item}", "")]
     if isinstance(block, Table):
         table = block.filled.folded(WIDTH - 2)
         lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
-        return ["", *([f"{table.caption}:"] if table.caption else []), *lines, ""]
+        return ["", *(_indented(f"{table.caption}:", "") if table.caption else []), *lines, ""]
     if isinstance(block, Formula):
         return [f"  {block.equation}"]
     if isinstance(block, Verbatim):
@@ -304,25 +308,35 @@ def _lines(block: Block) -> list[str]:
 
 
 def _answer_lines(answer: Answer) -> list[str]:
-    """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details."""
-    pieces = [f"{name} = {value} [{', '.join(ends)}] {unit}".strip() for name, value, ends, unit in answer.values]
-    pieces += [f"({answer.units})"] if pieces else []
-    head, lines = _indented(f"{answer.headline} ({answer.tests})", ""), list[str]()
-    for text in (*map(str, answer.equations), "   ".join(p.replace(" ", "\u00a0") for p in pieces)):
-        lines += _indented(text)
-    remarks = [*map(_indented, answer.remarks)]
-    figures = [f"{name} at {where}: {value}{remark and ', '}{remark}" for name, where, value, remark in answer.figures]
-    said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
-    end = _indented(f"next: {answer.next_step}; more: {answer.more}")
+    """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details.
+
+    So do the intervals of values where they would leave no room for one figure.
+    """
+    figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
+    head = _indented(f"{answer.headline} ({answer.tests})" if answer.tests else answer.headline, "")
+    end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
-    for parts, least in ((warned, 1), (said, 1), (remarks, 0), (said, 0)):
-        while len(parts) > least and sum(map(len, (head, *remarks, lines, *said, *warned, end))) > MOST_LINES:
-            parts.pop()
-    return [*head, *chain(*remarks), *lines, *chain(*said, *warned), *end]
+    for intervals in (True, False):
+        pieces = [
+            " ".join([f"{name} = {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
+            for name, value, ends, unit in answer.values
+        ]
+        pieces += [f"({answer.units}{'' if intervals else '; intervals: in the details'})"] if pieces else []
+        law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
+        said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
+        remarks = [*map(_indented, answer.remarks)]
+        for parts, least in ((warned, 1), (said, 1), (remarks, 0), *[(said, 0)] * (not intervals)):
+            while len(parts) > least and sum(map(len, (head, *remarks, law, *said, *warned, end))) > MOST_LINES:
+                parts.pop()
+        lines = [*head, *chain(*remarks), *law, *chain(*said, *warned), *end]
+        if len(lines) <= MOST_LINES:
+            break
+    return lines
 
 
 def _indented(text: str, first: str = "  ") -> list[str]:
     """Lines of a text, indented by two and four; blanks that do not break hold the pieces of a value together."""
     text = _UNIT.sub("\u00a0", text)
-    lines = wrap(text, WIDTH, initial_indent=first, subsequent_indent=2 * first, break_long_words=False)
+    fill = TextWrapper(WIDTH, first, 2 * first, break_long_words=False, break_on_hyphens=False)  # names of laws
+    lines = fill.wrap(text)
     return [line.replace("\u00a0", " ") for line in lines]

@@ -1,4 +1,4 @@
-"""Text, JSON and plot of a design: the advice, a table of planned tests, and a map of what they tell for each hour."""
+"""What a design says: the next test and what it tells, a table of planned tests, a map of what they tell each hour."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.experiments.planned_design import ALIKE, kind_of_reason, precision_text
+from creepkit.experiments.planned_design import ALIKE, USEFUL_PROBABILITY, kind_of_reason, precision_text
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.records import SECONDS_PER_HOUR, load_unit
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.reports.answer import MOST_CAUTIONS
+from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, plural
 from creepkit.reports.figures import panel_grid, wrapped
 from creepkit.reports.json_values import fields_to_json
+from creepkit.reports.words import DESIGN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,71 +24,132 @@ if TYPE_CHECKING:
     from creepkit.reports.svg import PageFigures
 
 
-ROWS, MOST_TICKS = 8, 8
-"""Tests in a table, and labels along an axis of the map."""
+ROWS, MOST_NEXT, MOST_TICKS = 8, 3, 8
+"""Tests in a table, those named after the first, and labels along an axis of the map."""
 
 
-def design_text(design: Design) -> str:
-    """The advice, the best tests in a table, and what else is to be said."""
+def design_details(design: Design) -> str:
+    """The answer, with the best tests in a table and what else is to be said."""
     return as_text(design_blocks(design))
 
 
+def design_sentence(design: Design) -> str:
+    """The advice: what to make, and what it is expected to tell."""
+    first = {"law": design.laws[0]}
+    if design.obstacle:
+        return DESIGN[design.obstacle].format(**first)
+    if not design.tests:
+        reasons = dict.fromkeys(f"that {kind_of_reason(reason)}" for _, reason in design.left_out)
+        return DESIGN["none"].format(reasons=" or ".join(reasons) or "of no kind")
+    best, expected = design.tests[0], [test.expectation for test in design.tests]
+    expected += [design.expected] if design.expected is not None else []
+    if design.goal == "law" and max(e.probability for e in expected) < USEFUL_PROBABILITY:
+        return DESIGN["hopeless"].format(test=best.description, probability=f"{best.expectation.probability:.2f}")
+    if len(design.plan) > 1 and design.expected is not None:
+        return DESIGN["plan"].format(count=len(design.plan), told=_told(design, design.expected))
+    run = design.plan[0] if design.plan else best
+    return DESIGN["test"].format(test=run.description, told=_told(design, run.expectation))
+
+
+def _told(design: Design, expected: Expectation) -> str:
+    """What a test is expected to tell, as the end of a sentence."""
+    if design.goal == "law":
+        return DESIGN["decides"].format(probability=f"{expected.probability:.2f}")
+    if np.isfinite(expected.sd):
+        before, after = (precision_text(sd, design.unit) for sd in (expected.current_sd, expected.sd))
+        return DESIGN["narrows"].format(quantity=design.goal, before=before, after=after)
+    factor = np.exp(-expected.information / max(len(expected.parameter_sd), 1))
+    return DESIGN["shrinks"].format(factor=f"{factor:.2g}")
+
+
+def _question(design: Design) -> str:
+    """Between which laws planned tests decide."""
+    if len(design.laws) == 1:
+        return DESIGN["from"].format(law=design.laws[0], others=listed(design.altered))
+    return DESIGN["apart"].format(laws=listed(design.laws)) + DESIGN["and beside"] * bool(design.altered)
+
+
+def design_answer(design: Design, picture: Block | None = None) -> Answer:
+    """The next test or the runs of the plan, what they tell, the next best, what to mind and what to do."""
+    runs = design.plan or design.tests[:1]
+    hours = f"{sum(run.hours for run in runs):.3g} h of machine time with setting up"
+    alike = {run.description: [one for one in runs if one.description == run.description] for run in runs}
+    shown = [(plural(len(same), "run"), same[0]) for same in alike.values() if len(runs) > 1]
+    shown += [("next best", test) for test in design.tests if test.description not in alike][:MOST_NEXT]
+    figures = [
+        (f"{name}, {run.description}", "", _precision(design, run.expectation), f"{run.hours:.3g} h of machine time")
+        for name, run in shown
+    ]
+    return Answer(
+        design.sentence,
+        f"{hours}; {plural(len(design.tests), 'test')} considered" if runs else "",
+        figures=figures,
+        cautions=design.notes[:MOST_CAUTIONS],
+        next_step=DESIGN[f"next {design.obstacle or ('make' if runs else 'none')}"],
+        remarks=[_question(design)] if design.goal == "law" and runs else [],
+        picture=picture,
+        more=".details(), or creepkit design --json",
+    )
+
+
+def _precision(design: Design, expected: Expectation) -> str:
+    """What a test tells, in few words."""
+    if design.goal == "law":
+        return f"probability {expected.probability:.2f}"
+    sd = precision_text(expected.sd, design.unit)
+    return f"standard deviation {sd}" if np.isfinite(expected.sd) else f"{expected.information:.2g} nats"
+
+
 def design_blocks(design: Design, figures: PageFigures | None = None, of: str = "") -> list[Block]:
-    """The advice, a table of the best tests, with `figures` the map, and what else is to be said."""
-    blocks: list[Block] = [Paragraph(design.sentence, "lead")]
-    if design.tests:
-        blocks.append(_table(design))
-        if figures is not None:
-            caption = (
-                "Expected information for an hour of machine time over first load and duration; the plan is marked. "
-            )
-            picture = figures.picture(
-                lambda: design_figure(design),
-                f"What further tests tell{of}",
-                "Map of the expected information for an hour of machine time over first load and duration, left of "
-                "constant loads, right of loads that change.",
-                f"{caption}{cells_text(design)}.",
-                shows_values=True,
-            )
-            blocks.append(picture)
+    """The answer, with `figures` with the map, a table of the best tests, and what else is to be said."""
+    drawn = None
+    if figures is not None and design.tests:
+        caption = "Expected information for an hour of machine time over first load and duration; the plan is marked. "
+        drawn = figures.picture(
+            lambda: design_figure(design),
+            f"What further tests tell{of}",
+            "Map of the expected information for an hour of machine time over first load and duration, left of "
+            "constant loads, right of loads that change.",
+            f"{caption}{cells_text(design)}.",
+            shows_values=True,
+        )
+    blocks: list[Block] = [design_answer(design, drawn), *([_table(design)] if design.tests else [])]
     reasons: dict[str, list[str]] = {}
     for description, reason in design.left_out:
         reasons.setdefault(kind_of_reason(reason), []).append(description)
     lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
-    lines += design.notes if design.tests else ()
+    lines += design.notes[MOST_CAUTIONS:] if design.tests else ()
     return [*blocks, Items(lines)] if lines else blocks
 
 
 def _table(design: Design) -> Table:
-    last = {"law": "probability, decisive and right", "parameters": "standard deviations, before > after"}.get(
-        design.goal, "sd after"
-    )
-    rows = []
+    """The best tests, with the standard deviations that they leave or the probability that they decide."""
+    head = {"law": "probability, decisive and right"}.get(design.goal, "standard deviation")
+    heads, rows = [head], list[tuple[str, ...]]()
+    if design.goal == "parameters":
+        now = design.tests[0].expectation.current_parameter_sd
+        heads = [f"sd of {name}" for name in now]
+        rows.append(("without a further test", *["–"] * 3, *(f"{sd:.3g}" for sd in now.values())))
     for test in design.tests[:ROWS]:
         e = test.expectation
-        sds = [f"{name} {e.current_parameter_sd[name]:.3g} > {sd:.3g}" for name, sd in e.parameter_sd.items()]
-        cell = ", ".join(sds) if design.goal == "parameters" else precision_text(e.sd, design.unit)
-        cell = f"{e.probability:.2f}" if design.goal == "law" else cell
-        numbers = (f"{test.hours:.3g}", f"{e.information:.2g}", f"{test.information_per_hour:.2g}")
-        rows.append((test.description, *numbers, cell))
-    caption = (
-        f"the first of {plural(len(design.tests), 'planned test')} considered, {order_text(design)}; goal: "
-        f"{design.goal}. A nat of information divides the volume of what is likely by 2.7"
-    )
-    columns = ("planned test", "machine time with setting up, h", "nats", "nats / h", last)
-    return Table(caption, columns, rows, numeric=(1, 2, 3))
+        told = [f"{sd:.3g}" for sd in e.parameter_sd.values()]
+        if design.goal != "parameters":
+            told = [f"{e.probability:.2f}" if design.goal == "law" else precision_text(e.sd, design.unit)]
+        nats = (f"{one:.2g}" if one else "–" for one in (e.information, test.information_per_hour))
+        rows.append((test.description, f"{test.hours:.3g}", *nats, *told))
+    caption = ORDER_BY_LAW if design.goal == "law" else ORDER
+    columns = ("planned test", "machine time, h", "nats", "nats / h", *heads)
+    return Table(caption, columns, rows, numeric=range(1, len(columns)))
 
 
-def order_text(design: Design) -> str:
-    """By what the planned tests are ordered, as a sentence."""
-    if design.goal != "law":
-        return "in the order of the expected information for each hour of machine time"
-    return (
-        f"in the order: tests with a probability of {DECISIVE_WEIGHT:g} or more of a decisive and right verdict, the "
-        f"shortest first; then the others by that probability in steps of {ALIKE:g}, and within a step by the expected "
-        "information; tests that were judged over the uncertainty of the parameters stand before all that were judged "
-        "at their estimates alone, which flatters them"
-    )
+ORDER = "the best tests, by the expected information for each hour of machine time; by a nat 2.7 times as much is known"
+
+
+ORDER_BY_LAW = (
+    f"the best tests: of those that decide with a probability of {DECISIVE_WEIGHT:g} the shortest first, then by that "
+    f"probability in steps of {ALIKE:g}, within a step by information"
+)
+"""By what planned tests are ordered."""
 
 
 def design_to_json(design: Design) -> dict[str, object]:
@@ -100,14 +163,9 @@ def design_to_json(design: Design) -> dict[str, object]:
             "at_draws": test.at_draws,
             "tests": [
                 {
-                    "specimen": h.specimen,
-                    "loading": {
-                        "quantity": h.loading.quantity,
-                        "times": h.loading.program().times.tolist(),
-                        "values": h.loading.program().values.tolist(),
-                    },
+                    **fields_to_json(h, "specimen geometry"),
+                    "loading": {"quantity": h.loading.quantity, **fields_to_json(h.loading.program(), "times values")},
                     "temperature": h.mean_temperature,
-                    "geometry": dict(h.geometry),
                     "duration": float(h.times[-1]),
                 }
                 for h in test.histories
@@ -131,9 +189,8 @@ def design_to_json(design: Design) -> dict[str, object]:
 
 
 def _expectation_to_json(e: Expectation) -> dict[str, Any]:
-    numbers = {name: float(getattr(e, name)) for name in ("sd", "current_sd", "probability", "wrong")}
-    known: dict[str, Any] = {"information": float(e.information)}
-    known |= {name: value for name, value in numbers.items() if np.isfinite(value)}
+    numbers = fields_to_json(e, "information sd current_sd probability wrong")
+    known: dict[str, Any] = {name: value for name, value in numbers.items() if value is not None}
     if e.parameter_sd:
         known |= fields_to_json(e, "parameter_sd current_parameter_sd")
     if e.chi_squares:

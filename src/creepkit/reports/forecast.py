@@ -1,25 +1,29 @@
-"""What a forecast says: by which laws, and of each test what it will show, how a measurement compares, and cautions."""
+"""What a forecast says: what was asked for and how far to trust it, and of each test everything that is predicted."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from textwrap import wrap
+from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.forecasts.banded_output import CHOICE_OF_LAW, LAW
+from creepkit.forecasts.draws import MISFIT_THERE
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
-from creepkit.reports.answer import end_figures, event_text
-from creepkit.reports.blocks import WIDTH, Block, Items, Paragraph, as_text
+from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
+from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
+from creepkit.reports.words import FORECAST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +31,7 @@ if TYPE_CHECKING:
 
     from creepkit.forecasts.banded_output import OutputForecast
     from creepkit.forecasts.forecast import Forecast
-    from creepkit.forecasts.forecast_of_test import FramesInside, TestForecast, TimeForecast
+    from creepkit.forecasts.forecast_of_test import TestForecast
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
     from creepkit.reports.svg import PageFigures
 
@@ -36,86 +40,138 @@ SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
 
 
-def forecast_text(forecast: Forecast) -> str:
-    """What is forecast by which laws, then each test."""
-    lines = as_text(forecast_blocks(forecast)).splitlines()
-    return "\n".join(line for text in lines for line in wrap(text, WIDTH, subsequent_indent="  "))
+def forecast_details(forecast: Forecast) -> str:
+    """The answer, with everything that is predicted of each test."""
+    return as_text(forecast_blocks(forecast))
+
+
+def forecast_answer(forecast: Forecast, picture: Block | None = None) -> Answer:
+    """What was asked for of a test, or how many measured ones lie within their bands; then the others."""
+    shown, tests, level = asked_figures(forecast), forecast.tests, f"{100 * forecast.level:g} %"
+    described = f"{kind_of_test(tests[0].history)}, {tests[0].history.condition}"
+    if len(tests) == 1:  # what was asked for, what else it reaches, and what it shows at its end
+        said_first = {one.name for one in shown}
+        shown += [one for one in _figures(tests[0]) if math.isfinite(one.value) and one.name not in said_first]
+        shown = [replace(one, where="") for one in shown]
+    inside = [_lies_inside(one) for one in tests]
+    outside, judged = inside.count(False), len(tests) - inside.count(None)
+    beyond = [names for one in tests if (names := _asked_beyond(one, times=forecast.asked))]
+    kind = "none" if not shown else "measured" if judged > 1 else "single"
+    trust = FORECAST[("some beyond" if len(tests) > 1 else "beyond") if beyond else "within"]
+    values = {
+        "what": shown[0].name if shown else "",
+        "value": shown[0].text if shown else "",
+        "trust": trust.format(quantities=listed([*chain(*beyond)]), count=len(beyond))
+        + FORECAST["contradicted"] * forecast.rejected,
+        **{"inside": judged - outside, "judged": judged, "level": level},
+    }
+    parts = [part for one in tests for part in end_shares(next(iter(one.outputs.values()), None))][:1]
+    following = "outside" if outside else "beyond" if beyond else "contradicted" if forecast.rejected else "use"
+    following = "fixed" if following in ("beyond", "use") and parts and parts[0] not in NARROWED else following
+    said = _laws_and_level(forecast, level)
+    return Answer(
+        FORECAST[kind].format(**values),
+        described if len(tests) == 1 else plural(len(tests), "test"),
+        figures=[(one.name, one.where, one.text, one.remark) for one in shown[kind == "single" :]],
+        cautions=_cautions(forecast, [one.name for one, holds in zip(tests, inside, strict=True) if holds is False]),
+        next_step=FORECAST[f"next {following}"].format(part=[*parts, ""][0]),
+        remarks=[said],
+        brackets=said,
+        picture=picture,
+        more=".details(), or creepkit predict --json",
+    )
+
+
+def _laws_and_level(forecast: Forecast, level: str) -> str:
+    """By which laws, with their weights, and what the intervals are."""
+    alone = len(forecast.laws) == 1
+    names = ", ".join(name if alone else f"{name} ({weight:.2g})" for name, weight in forecast.laws.items())
+    names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
+    right = FORECAST["wider" if forecast.rejected else "right" if alone else "one right"]
+    return FORECAST["by"].format(laws=names, level=level, right=right)
+
+
+NARROWED = (LAW, CHOICE_OF_LAW, MISFIT_THERE)
+"""Parts of a band that further tests make smaller."""
+
+
+def _lies_inside(test: TestForecast) -> bool | None:
+    """Whether all that was measured of a test lies in its bands and intervals; None where nothing was."""
+    found = [one.inside for one in test.times if one.inside is not None]
+    found += [*test.inside.whole.values()] if test.inside is not None else []
+    return all(found) if found else None
+
+
+def _asked_beyond(test: TestForecast, *, times: bool) -> list[str]:
+    """In which quantities what is shown first of a test is extrapolated; times : to values were asked for."""
+    reached = [one for one in test.times if math.isfinite(one.median) and bool(one.output) == times]
+    return test.extrapolated_in(reached[0] if reached and times else None)
+
+
+def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
+    """What to mind, the most serious first; what is said of several tests stands once."""
+    found = [FORECAST["outside"].format(tests=named(outside, "test"))] * bool(outside)
+    misfits = [one.misfit for one in forecast.tests if one.misfit is not None]
+    worst = max(misfits, key=lambda one: abs(one.log_factor), default=None)
+    found += [_misfit_text(worst)] if worst is not None else []
+    found += [one.caution.partition(". ")[0] for one in forecast.tests if one.caution]
+    return list(dict.fromkeys([*found, *(note for one in forecast.tests for note in one.notes)]))[:MOST_CAUTIONS]
+
+
+def _misfit_text(misfit: LawMisfit) -> str:
+    factor = f"{math.exp(abs(misfit.log_factor)):.3g}"
+    return FORECAST["misses"].format(factor=factor, here=f"{misfit.factor:.3g}")
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
-    """The laws and what bands hold, a list for each test, and with `figures` the curves. of : " of " its name."""
-    names = ", ".join(name if len(forecast.laws) == 1 else f"{name} ({w:.2g})" for name, w in forecast.laws.items())
-    names += f" ({forecast.left_out} more of too little weight)" if forecast.left_out else ""
-    right = "the law is right" if len(forecast.laws) == 1 else "one of these laws is right, with these weights"
-    bands = f"{100 * forecast.level:g} % bands and intervals of single tests"
-    blocks: list[Block] = [Paragraph(f"by {names}: {bands}, if {right}")]
-    wider = "the tests contradict the law: bands and intervals are wider by what it misses of their rates"
-    blocks += [Paragraph(wider)] if forecast.rejected else []
+    """The answer, with `figures` the curves, a table of all that is predicted, and remarks. of : " of " its name."""
+    drawn = None
     if figures is not None and any(test.outputs for test in forecast.tests):
-        caption = f"Forecast with bands of {100 * forecast.level:g} %: of measured values, and of whole curves (paler)."
-        description = "Forecast curves over time with pointwise and simultaneous bands; the list below has the numbers."
-        blocks.append(figures.picture(lambda: forecast_figure(forecast), f"Forecasts{of}", description, caption))
+        caption = f"Bands of {100 * forecast.level:g} %: of measured values, and of whole curves (paler)."
+        description = "Forecast curves over time with pointwise and simultaneous bands; the numbers stand beside them."
+        drawn = figures.picture(lambda: forecast_figure(forecast), f"Forecasts{of}", description, caption)
+    rows = [(test.name, one.name, one.text, one.remark) for test in forecast.tests for one in _figures(test)]
+    caption = f"everything that is predicted, with {100 * forecast.level:g} % intervals of a single test"
+    table = Table(caption, ("test", "what", "value", "remarks"), rows)
+    said: dict[str, list[str]] = {}
     for test in forecast.tests:
-        blocks.append(Paragraph(f"{test.name}: {kind_of_test(test.history)}, {test.history.condition}:"))
-        blocks.append(Items([*_lines(test)]))
-    return blocks
+        for line in _remarks(test):
+            said.setdefault(line, []).append(test.name)
+    answer, several = forecast_answer(forecast, drawn), len(forecast.tests) > 1
+    new = {line: names for line, names in said.items() if line not in answer.cautions}
+    lines = [f"{named(names, 'test')}: {line}" if several else line for line, names in new.items()]
+    listed_there = len(answer.figures) + 1 >= len(rows) and not several
+    return [answer, *([] if listed_there else [table]), *([Items(lines)] if lines else [])]
 
 
-def _lines(test: TestForecast) -> Iterator[str]:
-    """Outputs at the end, times, what the law misses, a measurement, what the band is made of, cautions."""
-    yield from (f"{one.name}: {one.text}" for one in end_figures(test))
-    yield from (_time_text(one, float(test.history.times[-1])) for one in test.times)
+def _remarks(test: TestForecast) -> Iterator[str]:
+    """What the law misses, a measurement, what the band is made of, what is extrapolated, cautions."""
     if test.misfit is not None:
-        yield misfit_sentence(test.misfit)
-    if test.caution:
-        yield test.caution
+        where = f"{test.misfit.stress:.4g} MPa and {celsius_text(test.misfit.temperature, digits=0)}"
+        yield f"{_misfit_text(test.misfit)}; they are at {where}"
     if test.inside is not None:
-        yield inside_sentence(test.inside)
-    leading = next(iter(test.outputs.values()), None)
-    if leading is not None and (shares := end_shares(leading)):
+        shares, whole = test.inside.share, test.inside.whole
+        yield from (f"{100 * share:.0f} % of the readings of {one} lie in the band" for one, share in shares.items())
+        yield from (f"the whole curve of {one} lies in the wider band" for one in shares if whole[one])
+    if shares := end_shares(next(iter(test.outputs.values()), None)):
         parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in shares.items())
         yield f"shares of the variance at its end, to first order: {parts}"
-    if test.extrapolation:
-        yield test.extrapolation
-    yield from test.notes
+    yield from filter(None, (test.extrapolation, test.caution, *test.notes))
 
 
-def misfit_sentence(misfit: LawMisfit) -> str:
-    """By which factor the law misses the tests nearest to a forecast, and what that widens it by."""
-    factor = math.exp(abs(misfit.log_factor))
-    where = f"{misfit.stress:.4g} MPa and {celsius_text(misfit.temperature, digits=0)}"
-    return (
-        f"it misses the rate of the nearest tests, at {where}, by a factor of {factor:.3g} where others predict them. "
-        f"Intervals hold what it misses here, a factor of {misfit.factor:.3g} on the rate"
-    )
+def _figures(test: TestForecast) -> Iterator[KeyFigure]:
+    """Times, with how probably each comes before the end of the test, and what it shows there."""
+    end = hours_number(float(test.history.times[-1]))
+    for one in test.times:
+        figure, chance = time_figure(one), f"before {end} h with probability {one.chance:.2g}"
+        yield replace(figure, remark="; ".join(filter(None, (figure.remark, chance))))
+    yield from end_figures(test)
 
 
-def _time_text(one: TimeForecast, end: float) -> str:
-    """When something comes; end : the last time of the test, s, before which it was asked for."""
-    event = event_text(one)
-    if not math.isfinite(one.low) and not math.isfinite(one.measured):
-        return f"{event}: not within the test of {hours_number(end)} h (probability of it {one.chance:.2g})"
-    text = f"{event}: median {hours_number(one.median)} [{hours_number(one.low)}, {hours_number(one.high)}] h"
-    if math.isfinite(one.measured):
-        where = {True: "inside", False: "outside", None: ""}[one.inside]
-        return f"{text}, measured {'> ' if one.censored else ''}{hours_number(one.measured)} h, {where}"
-    return f"{text}; before the end of the test at {hours_number(end)} h with probability {one.chance:.2g}"
-
-
-def inside_sentence(inside: FramesInside) -> str:
-    """How a measured test compares, in one line."""
-    shares = ", ".join(
-        f"{name} {100 * share:.0f} % of the frames in the band"
-        + (" and the whole curve in the wider one" if inside.whole[name] else "")
-        for name, share in inside.share.items()
-    )
-    return f"measured: {shares}"
-
-
-def end_shares(one: OutputForecast) -> dict[str, float]:
+def end_shares(one: OutputForecast | None) -> dict[str, float]:
     """{part: share of the variance} at the last time that is predicted, the largest first."""
-    alive = np.flatnonzero(np.isfinite(one.value))
-    if not alive.size:
+    alive = np.flatnonzero(np.isfinite(one.value)) if one is not None else np.zeros(0, int)
+    if one is None or not alive.size:
         return {}
     shares = {part: float(values[alive[-1]]) for part, values in one.shares.items()}
     return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
@@ -130,7 +186,6 @@ def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
 
 
 def _test_to_json(test: TestForecast) -> dict[str, Any]:
-    misfit = test.misfit
     return {
         "name": test.name,
         "condition": test.history.condition,
@@ -146,12 +201,7 @@ def _test_to_json(test: TestForecast) -> dict[str, Any]:
         },
         "times": [fields_to_json(one, "event value median low high chance measured censored") for one in test.times],
         **fields_to_json(test, "includes extrapolation notes caution"),
-        "misfit": None
-        if misfit is None
-        else {
-            "factor": misfit.factor,
-            "nearest": {**fields_to_json(misfit, "stress temperature"), "factor": math.exp(misfit.log_factor)},
-        },
+        "misfit": test.misfit and fields_to_json(test.misfit, "factor stress temperature log_factor"),
         "inside": None if test.inside is None else fields_to_json(test.inside, "share whole"),
     }
 
@@ -229,13 +279,9 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
         factor * v[positive] for v in (one.value, band.low, band.high, band.lowest, band.highest)
     )
     measured_hours, measured = _measured(test, one.output, factor)
-    finite = np.concatenate([[1e-12], *(v[np.isfinite(v)] for v in (curve, low, high, measured))])
-    top = float(finite.max())
-    bottom = max(SHOWN_RATIO * top, 1e-12) if logarithmic else float(min(finite[1:].min(initial=0.0), 0.0))
-    if not logarithmic and finite.size > 1 and finite[1:].min() > 0.4 * top:
-        bottom = float(finite[1:].min()) - 0.1 * (top - float(finite[1:].min()))
-    ceiling = 1.3 * top if logarithmic else top + 0.05 * abs(top - bottom)
-    span(axes, "y", bottom, ceiling, logarithmic=logarithmic)
+    known = np.concatenate([v[np.isfinite(v)] for v in (curve, low, high, measured)])
+    top = float(known.max(initial=1e-12))
+    span(axes, "y", known[known >= SHOWN_RATIO * top] if logarithmic else known, 1.1 * top, logarithmic=logarithmic)
     ends = axes.get_ylim()
     for lower, upper, alpha in ((lowest, highest, 0.15), (low, high, 0.3)):
         axes.fill_between(hours, np.clip(lower, *ends), np.clip(upper, *ends), color="#3b6fb6", alpha=alpha, lw=0)

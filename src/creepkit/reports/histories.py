@@ -31,7 +31,7 @@ MOST_VALUES = 4
 
 def histories_text(histories: Sequence[History]) -> str:
     """A row for each test, then what holds for all or some of them."""
-    return as_text([_table(histories), *map(Paragraph, _remarks(histories))]).strip("\n")
+    return as_text([_table(histories), Items(_remarks(histories))]).strip("\n")
 
 
 def history_blocks(histories: Sequence[History], more: str = "") -> list[Block]:
@@ -55,7 +55,8 @@ def _remarks(histories: Sequence[History]) -> list[str]:
     remarks = [_output_text(one, name) for one in histories if len(histories) == 1 for name in one.outputs]
     remarks += _counted(Counter(map(kind_of_test, histories)), len(histories))
     remarks += _counted(Counter(_strain_text(h) for h in histories if "strain" in h.outputs), len(histories))
-    remarks += filter(None, assumptions_text(histories).splitlines())
+    assumed = [line.removeprefix("assumed: ") for line in assumptions_text(histories).splitlines()]
+    remarks += [f"assumed: {'; '.join(assumed)}"] * bool(assumed)
     for key, counts in values.items():
         more = f" and {len(counts) - MOST_VALUES} more" if len(counts) > MOST_VALUES else ""
         remarks.append(f"{key}: {'; '.join(_counted(counts, len(histories))[:MOST_VALUES])}{more}")
@@ -118,7 +119,7 @@ def _rate_text(history: History) -> str:
     if history.minimum_rate is None:
         return "no frames"
     sd = "" if history.minimum_rate_sd is None else f" +- {history.minimum_rate_sd:.2g}"
-    return f"minimum creep rate {history.minimum_rate:.4g}{sd} 1/s, no frames"
+    return f"minimum creep rate {history.minimum_rate:.4g}{sd} 1/s"
 
 
 def _end_text(history: History) -> str:

@@ -23,7 +23,6 @@ from creepkit.limits import SIGNIFICANCE
 from creepkit.records.loading import held_of
 from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
-from creepkit.reports.design import order_text
 from creepkit.reports.identification import rate_scatter_sentence
 from creepkit.reports.law_names import title_in_sentence
 
@@ -293,23 +292,18 @@ def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list
             f"as random effects, were assessed by {listed(cited)}."
         ]
     for forecast in [*contents.forecasts.values()][:1]:
-        level, drawn = f"{100 * forecast.level:g} %", f"They come from {forecast.draws} draws in each test."
         yield [
-            f"Bands of {level} contain the uncertainty of the parameters and of the choice of the law.",
+            f"Bands of {100 * forecast.level:g} % contain the uncertainty of parameters and of the choice of the law.",
             "They contain the scatter between tests, dimensions, noise and numerical error as well.",
-            drawn if forecast.draws else "",
+            f"They come from {forecast.draws} draws in each test." * bool(forecast.draws),
         ]
     for design in [*contents.design.values()][:1]:
-        information = f"Expected information of further tests was computed{cite('lindley')}"
-        yield [f"{information}; they are listed {order_text(design)}."]
+        yield [f"Expected information of further tests about the {design.goal} was computed{cite('lindley')}."]
 
 
 def _software(contents: ReportContents, cite: Callable[..., str]) -> list[str]:
-    versions = dict(contents.provenance.versions)
-    if not versions and contents.identified:
-        versions = {"creepkit": str(contents.identified[0].fit.provenance.get("creepkit", ""))}
-    named = [
-        f"{name} {printable(text, 60)}{cite(*[name] * (name == 'creepkit'))}" for name, text in versions.items() if text
-    ]
+    """By which version; those of all packages stand where the page says how to repeat the work."""
+    found = [str(one.fit.provenance.get("creepkit", "")) for one in contents.identified]
+    known = printable(contents.provenance.versions.get("creepkit") or [*found, ""][0], 60)
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
-    return [sentence(f"The work was done with {listed(named)}{seed}")] if named else []
+    return [f"The work was done with creepkit {known}{cite('creepkit')}{seed}."] if known else []

@@ -44,26 +44,33 @@ SHOWN_EFFECTS = 6
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_text(assessment: RuptureAssessment) -> str:
-    """The method, the strengths of each temperature, what to mind and what to do next."""
-    return as_text([rupture_answer(assessment)])
-
-
 def rupture_details(assessment: RuptureAssessment) -> str:
     """The verdict, then methods, strengths and checks, and the notes."""
     return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
 
 
+def rupture_verdict(assessment: RuptureAssessment) -> str:
+    """The method to use, or those that the tests cannot tell apart, and the checks that the best fails."""
+    weights, best = assessment.methods, assessment.best.method
+    credible = [name for name, weight in weights.items() if weight > CREDIBLE_WEIGHT]
+    kind = "several" if len(credible) > 1 else "decisive" if assessment.decisive else "single"
+    said = RUPTURE["only" if len(weights) == 1 else kind].format(best=best, names=listed(credible))
+    return "; ".join([said, *_fails(assessment)])
+
+
+def _fails(assessment: RuptureAssessment) -> list[str]:
+    failed = [one.fault or one.name for one in assessment.checks if one.passed is False]
+    return [RUPTURE["fails"].format(best=assessment.best.method, check=check) for check in failed]
+
+
 def rupture_answer(assessment: RuptureAssessment) -> Answer:
     """It in few lines."""
-    weights, best, longest = assessment.methods, assessment.best, 10 ** float(assessment.tests.log_time.max())
-    credible = [name for name, weight in weights.items() if weight > CREDIBLE_WEIGHT]
+    longest, warned = 10 ** float(assessment.tests.log_time.max()), _fails(assessment)
     stated = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
     far = max((one.hours for one in stated), default=0.0)
-    failed = [one.fault or one.name for one in assessment.checks if one.passed is False]
-    warned = [RUPTURE["fails"].format(best=best.method, check=check) for check in failed]
     beyond = far > LONGEST_EXTRAPOLATION * longest
-    warned += [RUPTURE["extrapolated"].format(hours=f"{far:g}", longest=f"{longest:.4g}")] if beyond else []
+    following = "longer" if beyond else "check" if warned else "strengths"
+    said = RUPTURE["extrapolated"].format(hours=f"{far:g}", longest=f"{longest:.4g}")
     lives = rupture_figures(assessment)[: len(assessment.lives)]
     figures = [(one.name, one.where, one.text, one.remark) for one in lives]
     for T in dict.fromkeys(one.temperature for one in stated):
@@ -71,14 +78,11 @@ def rupture_answer(assessment: RuptureAssessment) -> Answer:
         texts = [interval_text((one.value or 0.0, *known_bounds(one))) for one in alike]
         hours = ", ".join(f"{one.hours:g}" for one in alike)
         figures.append(("strength", celsius_text(T, digits=0), f"{', '.join(texts)} MPa", f"at {hours} h"))
-    kind = "several" if len(credible) > 1 else "decisive" if assessment.decisive else "single"
-    kind = "only" if len(weights) == 1 else kind
-    following = "longer" if beyond else "check" if failed else "strengths"
     return Answer(
-        RUPTURE[kind].format(best=best.method, names=listed(credible)),
+        assessment.verdict.partition("; ")[0],
         _tests_text(assessment),
         figures=figures,
-        cautions=warned,
+        cautions=[*warned, *[said] * beyond],
         next_step=RUPTURE[following].format(hours=f"{float(f'{far / LONGEST_EXTRAPOLATION:.2g}'):g}"),
         more=".details(), or creepkit rupture --json",
     )

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.reports.answer import interval_text
-from creepkit.reports.blocks import Paragraph, Table, as_text
+from creepkit.reports.answer import table_of_groups
+from creepkit.reports.blocks import Paragraph, as_text
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
-from creepkit.reports.terminal import print_json, tell
-from creepkit.screening.results import (
-    COMPARISON_STRESS,
-    AlloyResult,
-    confirmation_text,
-    mean_chi_square,
-    result_columns,
-)
+from creepkit.screening.results import AlloyResult, result_columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,17 +23,10 @@ if TYPE_CHECKING:
     from creepkit.screening.results import ScreeningResult
 
 
-TABLE_COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "local exponent", "chi-square", "confirmed")
-
-
-def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
-    """One row an alloy; its cells are those of TABLE_COLUMNS."""
-    return [_table_row(plate, result) for result in plate.results]
-
-
 def screening_text(plate: ScreeningResult) -> str:
-    """The table, the share of each law in each class, and what failed."""
-    return as_text([Table("", TABLE_COLUMNS, table_rows(plate)), *map(Paragraph, summary_lines(plate))])
+    """The law, exponent and rate of each alloy, the share of each law in each class, and what failed."""
+    table = table_of_groups({one.alloy: (one.best, one.decisive) for one in plate.identified})
+    return as_text([*([table] if plate.identified else []), *map(Paragraph, summary_lines(plate))])
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:
@@ -58,23 +45,6 @@ def summary_lines(plate: ScreeningResult) -> list[str]:
         if error is not None and not error.confirms:
             lines.append(f"{result.alloy}: not confirmed: {error.sentence}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
-
-
-def _table_row(plate: ScreeningResult, result: AlloyResult) -> tuple[str, ...]:
-    first_cells = (result.alloy, plate.class_of(result.alloy))
-    if not result.identified:
-        return (*first_cells, "none", *[""] * (len(TABLE_COLUMNS) - 3))
-    fit = result.best
-    names = fit.law.name + (f" or {', '.join(result.credible_laws[1:])}" if len(result.credible_laws) > 1 else "")
-    return (
-        *first_cells,
-        names,
-        f"{result.laws[0].weight:.2f}",
-        interval_text(tuple(map(float, fit.rate(COMPARISON_STRESS, warn=False)))),
-        interval_text(tuple(map(float, fit.local_exponent(COMPARISON_STRESS, warn=False)))),
-        f"{mean_chi_square(fit):.3g}",
-        confirmation_text(result),
-    )
 
 
 def _failure_text(alloy: str, failure: str) -> str:
@@ -130,16 +100,8 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
     return sum(weights) / len(members)
 
 
-def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:
-    """Print the table, what it sums up to, and what was written."""
-    if as_json:
-        print_json(_plate_to_json(plate, written))
-        return
-    for text in (plate, *(f"wrote {path}" for path in written)):
-        tell(text)
-
-
-def _plate_to_json(plate: ScreeningResult, written: list[Path]) -> dict[str, Any]:
+def plate_to_json(plate: ScreeningResult, written: Sequence[Path]) -> dict[str, Any]:
+    """Columns of each alloy, shares of laws by class, what failed, and the files that were written."""
     return {
         "alloys": [result_columns(plate, result) for result in plate.results],
         "shares": plate.law_fractions(),

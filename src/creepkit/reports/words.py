@@ -7,63 +7,106 @@ the result puts in.
 from __future__ import annotations
 
 HEADLINES = {
+    # everything that was measured is predicted within a factor of 2
     "use": "use {law} for {good}; {truth}",
+    # some of it is, some is not
     "use in part": "use {law} for {good}, not {bad}; {truth}",
+    # everything is, but the tests contradict the law
     "between": "use {law} between the tests only, for {good}; {truth}",
+    # some is, and they contradict it
     "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
+    # nothing is
     "use nothing": "do not use {law}: it misses {bad}; {truth}",
+    # nothing can be compared, as of fields alone
     "fitted": "{law} was fitted; {truth}",
+    # the search did not converge
     "not found": "do not use {law} yet: the search for its values did not converge{described}",
 }
 """{kind: the first line of an answer}."""
 
 
 TRUTHS = {
+    # no noise is stated, and too few readings show it
     "not judged": "whether it is true cannot be judged",
+    # the p-value is 0.3 % or more
     "explains": "the tests do not contradict it",
+    # rates contradict it, and one cause explains them best (its sentence follows)
     "explained": "{cause}",
+    # a law of creep and rupture misses both, in opposite ways
     "two exponents": "by it minimum rates contradict rupture times",
+    # it misses curves, but not only by their rate
     "shape": "curves differ in shape",
+    # any other contradiction
     "noise": "the tests differ from it by more than their noise",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
 
 CAUTIONS = {
+    # a value lies within 0.1 % of a bound of its search that is not physical
     "held": "{law} is held at {name} = {value}, the {end} bound of its search; to go on, write {wider}",
+    # the search did not converge
     "not converged": "the search did not end: these values may not be its best",
+    # an answer from a file says nothing of it
     "unknown": "whether the tests contradict the law is not known",
+    # a simulation ends before a reading, or gives no number
     "unpredicted": "it does not predict every reading of {tests}",
+    # as in the first line
     "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
+    # it misses curves: where its misfit is largest in noises
     "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
+    # the same, where its strain runs away before the test's
     "runs away": "it is worst in {test}: by the law it has broken by {time}",
+    # a thickness, offset or drift of usual size takes the contradiction away
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
+    # a nuisance lies three standard deviations from what was stated
     "implausible": "it takes {nuisance}, far from what was stated",
+    # it cannot be judged
     "noise unknown": "the noise of readings is not known: the law cannot be judged",
+    # another law has a weight of 0.05 or more
     "undecided": "the tests cannot tell it apart from {laws}",
+    # an interval as wide as said there ends at a bound
     "not determined": "{by} do not determine {names}",
+    # one so wide lies between its bounds
     "hardly determined": "{by} hardly determine {names}",
+    # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {exponent}",
+    # offsets or drifts would move rates
     "not included": "intervals do not include {kinds}: rates move by {change}",
+    # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
 """{kind: a caution}, the most serious first."""
 
 
 NEXT = {
+    # the search did not converge
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
+    # the law is contradicted, and one that was not tried has what it lacks
     "law": "try {law} as well, for {why}",
+    # it is contradicted, and no other was tried
     "laws": "compare it with other laws that suit the tests (creepkit init)",
+    # it is contradicted, others were tried, and the tests are creep curves of bars
     "search laws": "search laws that nobody wrote down (creepkit identify TESTS --search)",
+    # so it is, and they are not, or a search tried them
     "within": "forecast between the tests only (creepkit predict): beyond them its misfit grows",
+    # it cannot be judged
     "noise": "state the noise of the readings in a column {column}",
+    # laws have weights of 0.05 or more, and bars can tell them apart
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
+    # bars cannot
     "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    # the law above a threshold stress explains the tests as well
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
+    # what nobody measured would take the weight from the best law
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
+    # what nobody modelled, of usual size, takes the contradiction away; or the true stress held in place of the load
     "remedy": "find out whether there was {remedy}: the law would then explain the tests",
+    # parameters are not determined, and a bar would do it
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
+    # a bar would not
     "determine otherwise": "make a test that determines {names} (creepkit design)",
+    # none of these
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
 }
 """{kind: what to do now}."""
@@ -76,24 +119,122 @@ BRACKETS = (
 """Below the numbers of an answer."""
 
 
+CONSTANT_LOAD = (
+    "under a constant load the true stress rises with strain, here by up to {growth}: "
+    "the interval of the stress exponent rests on the form of the law too"
+)
+"""Beside the exponent of such tests."""
+
+
 RUPTURE = {
+    # weights of 0.05 or more
     "several": "use the mean of {names}: the tests cannot tell them apart",
+    # weight of 0.95, and all checks pass
     "decisive": "use {best}, which passes all checks",
+    # not all pass
     "single": "use {best}, which has nearly all the weight",
+    # as it says
     "only": "use {best}, the only method that was fitted",
+    # of each
     "fails": "{best} fails: {check}",
+    # beyond three times the longest test
     "extrapolated": "strengths at {hours} h are extrapolated: the longest test has {longest} h",
+    # so it is
     "longer": "test to {hours} h: strengths beyond three times the longest test are extrapolated",
+    # one fails
     "check": "look at the tests of the check that fails",
+    # neither
     "strengths": "use these strengths with their bounds",
 }
 """{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
 
 
+FORECAST = {
+    # one test
+    "single": "{what} {value}; {trust}",
+    # measured tests
+    "measured": "{inside} of {judged} measured tests lie within their {level} bands and intervals; {trust}",
+    # nothing can be predicted
+    "none": "nothing is predicted of these tests",
+    # in their ranges
+    "within": "within the tests",
+    # outside them
+    "beyond": "extrapolated beyond the tests in {quantities}",
+    # its end, where they contradict the law
+    "contradicted": ", by a law that the tests contradict",
+    # always
+    "by": "by {laws}; in brackets {level} intervals of a single test, {right}",
+    # its end, of one law
+    "right": "if the law is right",
+    # of several
+    "one right": "if one of these laws is right, with these weights",
+    # of a contradicted one
+    "wider": "wider by what the law misses",
+    # of several tests
+    "some beyond": "{count} of them extrapolated beyond the tests",
+    # a caution
+    "outside": "what was measured of {tests} lies outside its band or interval",
+    # a caution, of a contradicted law
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals hold one of {here} here",
+    # one lies outside
+    "next outside": "identify the law again with these tests (creepkit identify)",
+    # it is extrapolated
+    "next beyond": "make a test nearer to it (creepkit design)",
+    # the law is contradicted
+    "next contradicted": "look for a law that the tests do not contradict (creepkit identify TESTS --search)",
+    # the largest part is none of the law's
+    "next fixed": "plan with the interval: most of it is {part}, which no further test makes smaller",
+    # none of these
+    "next use": "plan with the interval, or narrow it by a further test (creepkit design)",
+}
+"""{kind: what a forecast says}, its first line and how far to trust it, by which laws, cautions, what to do next."""
+
+
+DESIGN = {
+    # one run
+    "test": "next test: {test}; {told}",
+    # several in the budget
+    "plan": "make {count} runs: together {told}",
+    # none with 0.2 or more
+    "hopeless": "no test is likely to decide between the laws; the best, {test}, does with probability {probability}",
+    # as it says
+    "contradicted": "no test is proposed: the tests contradict {law}, the best law",
+    # as it says
+    "one law": "no test is proposed: {law} remains alone, and nothing is to be told apart from it",
+    # all are left out
+    "none": "no test can be made: there are only candidates {reasons}",
+    # the goal is the law
+    "decides": "it decides between the laws with probability {probability}",
+    # a quantity
+    "narrows": "it brings the standard deviation of the {quantity} from {before} to {after}",
+    # the parameters
+    "shrinks": "intervals of the parameters become {factor} times as wide",
+    # a sum or threshold remains beside it
+    "from": "it tells {law} from {others}",
+    # several remain
+    "apart": "it tells {laws} apart",
+    # its end, with sums or thresholds
+    "and beside": ", and each from what the tests allow beside it",
+    # a test is proposed
+    "next make": "make it, then identify the law again with its file (creepkit identify)",
+    # none is
+    "next contradicted": "find a law that the tests do not contradict, or design for the values (--goal parameters)",
+    # none is
+    "next one law": "design for the values, or for a rate or an exponent (--goal parameters, rate, exponent)",
+    # none can be made
+    "next none": "state what the rig can do: loads, durations, temperatures (creepkit design --help)",
+}
+"""{kind: what a design of further tests says}, its first line, what it tells, and what to do next."""
+
+
 TRY = {
+    # rates say so
     "exponent rises": "the stress exponent rises with stress",
+    # rates say so
     "exponent falls": "the stress exponent falls with stress",
+    # its largest misfit lies in the first half of a test
     "early": "this one misses the beginning of the curves",
+    # or in the second
     "late": "this one misses the end of the curves",
 }
 """{kind: why a law is to be tried}."""

@@ -19,11 +19,11 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, write_j
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.limits import ANY_NUMBER, PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
 from creepkit.records import SECONDS_PER_HOUR
-from creepkit.records.presentable import Plotted, Presentable, Tabulated
+from creepkit.records.presentable import Plotted, Presentable, Tabulated, function_of_reports
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.checks import AssessmentCheck
 from creepkit.rupture_assessment.fitting import MinimumRateRelation
@@ -186,24 +186,8 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
 
     @property
     def verdict(self) -> str:
-        """One sentence: which method, or which the tests cannot tell apart, and which checks it fails."""
-        weights, best = self.methods, self.best.method
-        failed = [check.fault or check.name for check in self.checks if check.passed is False]
-        open_ = [check.name for check in self.checks if check.passed is None]
-        if self.decisive:
-            return f"decisive: {best}, of {len(weights)} methods tried; it passes all {len(self.checks)} checks"
-        if len(weights) == 1:
-            what = f"only {best} was fitted"
-        elif weights[best] > DECISIVE_WEIGHT:
-            what = f"not decisive: of {len(weights)} methods tried {best} is best (weight {weights[best]:.2f})"
-        else:
-            credible = [f"{name} ({w:.2f})" for name, w in weights.items() if w > CREDIBLE_WEIGHT]
-            what = f"not decisive: these tests cannot tell apart {', '.join(credible)} by their weights"
-        if failed:
-            return f"{what}; {best} fails {len(failed)} of {len(self.checks)} checks: {'; '.join(failed)}"
-        if open_:
-            return f"{what}; {best} fails no check, but {len(open_)} cannot be made: {'; '.join(open_)}"
-        return f"{what}; {best} passes all {len(self.checks)} checks"
+        """One sentence: which method to use, or which the tests cannot tell apart, and which checks it fails."""
+        return str(function_of_reports("rupture.rupture_verdict")(self))
 
     def models(self, method: str | None = None) -> WeightedModels:
         """Fits with weights that add up to one: of the average (None), or of one method."""
@@ -304,7 +288,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         """
         return write_assessment(self, path)
 
-    shown_by = "rupture.rupture_text"
+    shown_by = "rupture.rupture_answer"
     detailed_by = "rupture.rupture_details"
 
 

@@ -87,11 +87,6 @@ def mean_relative_squared_error(fit: Identification) -> float:
     return float(np.mean([e.relative_squared_error for e in fit.errors.values()]))
 
 
-def mean_chi_square(fit: Identification) -> float:
-    """Mean of (error / noise)^2 over outputs; one is noise alone."""
-    return float(np.mean([e.chi_square for e in fit.errors.values()]))
-
-
 @dataclass(frozen=True, eq=False)
 class ScreeningResult(Presentable, Plotted):
     """The result of screen().

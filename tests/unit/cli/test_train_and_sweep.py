@@ -115,8 +115,8 @@ def test_targets_of_a_dimple(saved):
     words = "--pressure 8 --end-h 0.5 --temperature-c 850 --modulus-gpa 150 --target amplitude=0.05,0.06"
     result = creepkit(f"predict {folder / 'ranking.json'} {words}")
     assert result.exit_code == 0, result.output
-    assert "amplitude 0.05 mm:" in result.stdout
-    assert "amplitude 0.06 mm:" in result.stdout
+    assert "time to amplitude 0.05 mm " in result.stdout
+    assert "time to amplitude 0.06 mm:" in result.stdout
 
 
 WRONG = {

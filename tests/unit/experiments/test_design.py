@@ -155,7 +155,7 @@ def test_one_law_is_told_from_what_the_tests_allow_beside_it():
     assert ranking.challenges
     found = design(ranking)
     assert "strain-hardening+time-hardening" in found.altered
-    assert "tells strain-hardening from strain-hardening+time-hardening" in found.sentence
+    assert "it tells strain-hardening from strain-hardening+time-hardening" in str(found)
     made = carried_out(BAR, STRAIN_HARDENING, SPL, found.best.histories, seed=1)
     assert found.best.expectation.probability > 0.95
     after = [identify(law, [*tests, *made], BAR, settings=LIKELY) for law in (STRAIN_HARDENING, TIME_HARDENING)]

@@ -1,5 +1,8 @@
 """Records print as text: what their methods import stands in layers above."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 
 from creepkit.inverse.selection import rank
@@ -7,7 +10,6 @@ from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.laws.norton import NORTON
 from creepkit.reports import words
 from helpers.log_rate_predictor import known_scatter, measured
-from helpers.paths import ROOT
 
 RECORDS = [Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2))]
 
@@ -22,10 +24,10 @@ def test_records_print_as_text() -> None:
     np.testing.assert_array_equal(samples.to_dataframe()["n"], samples.values["n"])
 
 
-def test_the_page_of_findings_has_every_text_of_an_answer() -> None:
-    """So that who edits a text sees when it is said, and who reads the page reads what is said now."""
-    page = (ROOT / "docs" / "concepts" / "findings.md").read_text(encoding="utf-8")
-    rows = [line.split(" | ") for line in page.splitlines() if line.startswith("| ") and "what is said" not in line]
-    tables = (words.HEADLINES, words.TRUTHS, words.CAUTIONS, words.NEXT, words.TRY)
-    said = [row[0][2:] for row in rows if len(row) == 2 and row[0] != "| ---"]
-    assert said == [text for table in tables for text in table.values()]
+def test_every_text_of_an_answer_is_short_and_says_when_it_is_said() -> None:
+    lines = Path(words.__file__).read_text(encoding="utf-8").splitlines()
+    texts = [k for k, line in enumerate(lines) if line.startswith('    "') and line.endswith(('",', ": ("))]
+    assert [lines[k] for k in texts if not lines[k - 1].startswith("    # ")] == []
+    assert [
+        one for k in texts for one in re.split("[;:] ", lines[k].partition('": ')[2]) if len(one.split()) > 25
+    ] == []

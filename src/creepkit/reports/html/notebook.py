@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import singledispatch
 from itertools import count
 
+from creepkit.experiments.planned_design import Design
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
@@ -15,6 +16,7 @@ from creepkit.reports.answer import equations
 from creepkit.reports.blocks import Block, Formula, Paragraph, Verbatim, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
+from creepkit.reports.design import design_blocks
 from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks, tests_figure
 from creepkit.reports.html.page import block_shown, findings_section, group_answer
@@ -28,8 +30,9 @@ from creepkit.rupture_assessment.assessment import RuptureAssessment
 STYLE = (
     ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(18rem,1fr));gap:0 1rem}"
     ".creepkit .formula math{width:fit-content;margin:0}"
-    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0 0 .4rem;font-weight:600}.creepkit figure{margin:.5rem 0}"
-    ".creepkit dl span{display:block;font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
+    ".creepkit .lead{font-weight:600}.creepkit dd{margin:0;font-weight:600}"
+    ".creepkit dl>div{margin:.4rem 0}.creepkit figure{margin:.5rem 0}"
+    ".creepkit dd.note{font-weight:400;opacity:.7}.creepkit .drawing svg{width:100%;height:auto}"
     ".creepkit table{border-collapse:collapse}.creepkit caption{text-align:left;opacity:.7}"
     ".creepkit th,.creepkit td{text-align:left;padding:.2rem 1rem .2rem 0;border-bottom:1px solid #8886}"
     ".creepkit .n{text-align:right}"
@@ -83,6 +86,7 @@ def _(tests: Histories) -> Sequence[Block]:
 _blocks.register(History)(lambda history: _blocks(Histories([history])))
 _blocks.register(Specimen)(specimen_blocks)
 _blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
+_blocks.register(Design)(lambda design: design_blocks(design, _figures()))
 _blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])
 
 

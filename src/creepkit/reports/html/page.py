@@ -34,7 +34,7 @@ from creepkit.reports.blocks import (
 from creepkit.reports.description import tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
-from creepkit.reports.forecast import forecast_blocks
+from creepkit.reports.forecast import forecast_answer, forecast_blocks
 from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
 from creepkit.reports.identification import (
@@ -57,7 +57,6 @@ from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
     from creepkit.extraction.extraction import Extraction
-    from creepkit.forecasts.forecast import Forecast
     from creepkit.instruments.imposed import Imposed
     from creepkit.reports.contents import ReportContents, ReportGroup
 
@@ -316,12 +315,17 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
             *("Rupture", contents.rupture, rupture),
             lambda one: f"{plural(len(one.ranked), 'method')} compared",
         ),
-        "forecasts": ("Forecasts", contents.forecasts, lambda one, of: forecast_blocks(one, figures, of), _asked_text),
+        "forecasts": (
+            "Forecasts",
+            contents.forecasts,
+            lambda one, of: forecast_blocks(one, figures, of),
+            lambda one: forecast_answer(one).headline,
+        ),
         "design": (
             "Further tests",
             contents.design,
             lambda one, of: design_blocks(one, figures, of),
-            lambda one: f"{plural(len(one.tests), 'planned test')} compared",
+            lambda one: one.sentence,
         ),
     }
     for identifier, (title, results, blocks_of, said) in stages.items():
@@ -334,13 +338,6 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
                 for k, (name, one) in enumerate(zip(results, blocks, strict=True), start=1)
             ]
             yield PageSection(identifier, title, (), inner, result=f"{len(results)} results")
-
-
-def _asked_text(forecast: Forecast) -> str:
-    """What the first test of a forecast shows."""
-    figures = asked_figures(forecast)
-    more = f"; {len(forecast.tests) - 1} more" if len(forecast.tests) > 1 else ""
-    return f"{figures[0].name} {figures[0].text}, {figures[0].where}{more}" if figures else "nothing predicted"
 
 
 def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) -> list[Block]:
