@@ -17,7 +17,7 @@ from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
-from creepkit.readers.history_csv import HISTORY_CSV
+from creepkit.readers.history_csv import HISTORY_CSV, TEXT_SUFFIXES
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
@@ -177,6 +177,8 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     for general in GENERAL_READERS:
         if len(accepting) > 1:
             accepting = [reader for reader in accepting if reader.name not in general]
+    if not accepting and path.suffix.lower() in TEXT_SUFFIXES:  # whose error says what it lacks
+        accepting = [reader for reader in readers if reader.name == HISTORY_CSV.name]
     if not accepting:
         reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
         raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")
