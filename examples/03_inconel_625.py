@@ -105,7 +105,7 @@ tests = ck.exclude_suspect_frames(tests)
 # each dimple's thickness unknown.
 
 ways = {
-    "law alone": dict(nuisances=(), weights="noise"),
+    "law alone": dict(nuisances=(), weights="equal"),
     "offset, thickness": dict(nuisances=(ck.Nuisance("offset", sd=0.012), THICKNESS)),
 }
 starts = 4

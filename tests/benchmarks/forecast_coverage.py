@@ -61,7 +61,7 @@ class Row:
     known: bool = False
     states_noise: bool = True
     isothermal: bool = False
-    weights: str = "noise"
+    weights: str = "equal"
     correlated: tuple[float, float] | None = None
 
     @property

@@ -8,7 +8,7 @@ for tests 01 to 08 and one for tests 09, 11 and 12. Nuisance parameters are the 
 thickness of each dimple (0.4935 mm, standard deviation 0.027 mm). Laws are multiplied by Arrhenius' factor about
 1050 K; n(t) is the drifting exponent without strain hardening.
 
-Misfit: by finite elements, `ck.identify(law, tests, using="bulge", weights="noise")`. The pooled loss is that of the
+Misfit: by finite elements, `ck.identify(law, tests, using="bulge", weights="equal")`. The pooled loss is that of the
 amplitude: squared differences over squared deviations from the mean of all frames. Chi-square is that of
 `fit.adequacy`, of all outputs; "left" is the standard deviation of the amplitude beyond the noise that neighbouring
 frames show. Held out: each test predicted through the reduced-order model from the others, by likelihood, at nominal
@@ -63,7 +63,7 @@ class Runs:
 
     def fit(self, law: str, event: bool) -> Row:
         """One law by finite elements, by least squares."""
-        return row_of(ck.identify(LAWS[law], self.tests, using="bulge", weights="noise", **self.settings(event)))
+        return row_of(ck.identify(LAWS[law], self.tests, using="bulge", weights="equal", **self.settings(event)))
 
     def held_out(self, law: str, event: bool) -> Row:
         """Each test predicted through the reduced-order model from the others."""

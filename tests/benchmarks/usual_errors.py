@@ -103,7 +103,7 @@ def main():
     page.table("tests", "weights", "campaigns (failed)", *heads, "half width")
     for name in options.cases:
         case = CASES[name]
-        for weights in ("noise", "likelihood"):
+        for weights in ("equal", "likelihood"):
             rows, failed = [], 0
             for seed in range(options.campaigns):
                 alloy, tests = planted(case, seed)

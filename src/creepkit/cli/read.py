@@ -161,8 +161,8 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
         heads = [find_head(path) for path in files]
         if all(any(one.required and one.accepts(head.names) for one in formats) for head in heads):
             return [ck.read_record(path) for path in files]
-        strains, names = ("strain", "dehnung", "déformation"), " ".join(n for head in heads for n in head.names).lower()
-        if not all(head.has_clock for head in heads) or any(word in names for word in strains):
+        strains = ("strain", "dehnung", "déformation", "extens", "elong", "allong", "ext a", "ext 1", "weg 1")
+        if not all(h.has_clock for h in heads) or any(s in n.lower() for h in heads for n in h.names for s in strains):
             return []
         try:
             ck.read_histories(files)

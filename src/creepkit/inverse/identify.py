@@ -149,7 +149,7 @@ def describing(fit: Identification) -> Identification:
     adequacy = fit.adequacy
     if fit.settings.weights != "likelihood" or adequacy is None or fit.predictor is None or not adequacy.misses_shape():
         return fit
-    start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="noise")
+    start, settings = StartingEstimate.from_identification(fit), replace(fit.settings, weights="equal")
     values = identify(fit.law, fit.histories, fit.predictor, settings=settings, start=start)
     notes = dict.fromkeys((*values.notes, *(note for note in fit.notes if "were not used" in note)))
     return replace(values, notes=tuple(notes), provenance={**fit.provenance, **values.provenance})
@@ -335,7 +335,7 @@ def _describing_estimate(found: EstimationResult, limits: IterationLimits, how: 
         if not judge.adequacy(judged_at(problem, linear, noise)).misses_shape(CLEARLY):
             return found
     _check_bounds(found)
-    problem = replace(problem.about_rates(found.x, None), settings=replace(problem.settings, weights="noise"))
+    problem = replace(problem.about_rates(found.x, None), settings=replace(problem.settings, weights="equal"))
     return estimate_iteratively(problem, found.x, _working_estimator(problem), limits, how.progress)
 
 

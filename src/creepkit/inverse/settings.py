@@ -19,7 +19,7 @@ from creepkit.limits import SEED, SOBOL_POINTS, STARTS, Limits
 from creepkit.options import Options, option
 from creepkit.records import Nuisance, Predictor, dimension_named
 
-Weights = Literal["automatic", "noise", "likelihood"]
+Weights = Literal["automatic", "equal", "likelihood"]
 
 
 UsualErrors = Literal["usual", "none"] | Mapping[str, float]
@@ -52,9 +52,9 @@ class IdentificationSettings(Options, title="settings of an identification"):
     nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate,
         both estimated.
     weights : of the values; noise, intervals and ranking are by one likelihood, with white noise and autocorrelation of
-        every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "noise":
+        every output (see inverse.variance_components). "likelihood": the values too, under the usual errors. "equal":
         least squares of frames of equal weight, which describe tests best where no law explains them. "automatic",
-        the default: "likelihood", but "noise" where a law misses the shape of curves (see inverse.identify.describing).
+        the default: "likelihood", but "equal" where a law misses the shape of curves (see inverse.identify.describing).
     further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
         when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
@@ -76,7 +76,7 @@ class IdentificationSettings(Options, title="settings of an identification"):
         flag="nuisance",
         example="thickness=0.4935:0.027",
     )
-    weights: Weights = option("automatic", "Of readings: by their likelihood; with noise all alike.")
+    weights: Weights = option("automatic", "Of readings: by their likelihood, or all equal.")
     suspect_frames: Literal["exclude", "keep"] = option("exclude", "Frames that unload, fall or lie apart.")
     further_laws: int = option(6, "Laws that are tried at most where none explains the tests.", Limits(0, 1000))
     rupture_times: Literal["auto", "use", "ignore"] = option(

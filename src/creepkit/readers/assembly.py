@@ -195,6 +195,9 @@ def assemble_without_frames(
     end = conditions.take_number("end_time")
     if is_end:
         time, end = None, end or time
+    if ended == STOPPED and end is None:  # a remark of which an answer says so, "Laufzeit 40215 h", says when
+        said = [k for k, text in conditions.labels.items() if conditions.end_terms.get(text.casefold()) == STOPPED]
+        end = _time_in_remark(conditions, said)
     if ended == RUPTURED and time is None and end is not None:
         time, end = end, None
     if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
@@ -297,7 +300,7 @@ def _time_and_end(
         return time, STOPPED, True
     broke = [label for label, end in (firm | remarks).items() if end == RUPTURED]
     if time is None and frames is not None and broke:
-        time = _time_in_remark(conditions, broke, frames)
+        time = _time_in_remark(conditions, broke, float(frames.times[-1]))
         names_another = time is None and any(_HOURS.search(conditions.labels[label]) for label in broke)
         said = said if names_another else {RUPTURED}
     return time, "".join(said), False
@@ -311,16 +314,16 @@ AT_LAST_FRAME = 0.01
 """Of the time of the last frame, by which a rounded time of rupture may lie before it."""
 
 
-def _time_in_remark(conditions: StatedConditions, labels: Sequence[str], frames: TableFrames) -> StatedNumber | None:
-    """The one time in hours that remarks on the rupture of a test name, if it is not before its last frame."""
+def _time_in_remark(conditions: StatedConditions, labels: Sequence[str], last: float = 0.0) -> StatedNumber | None:
+    """The one time in hours that remarks on the end of a test name, if it is not before its last frame, s."""
     texts = {label: conditions.labels[label] for label in labels}
     found = {float(h.replace(",", ".")): label for label, text in texts.items() for h in _HOURS.findall(text)}
     if len(found) != 1:
         return None
     ((hours, label),) = found.items()
-    if hours * SECONDS_PER_HOUR < (1.0 - AT_LAST_FRAME) * frames.times[-1]:
+    if hours * SECONDS_PER_HOUR < (1.0 - AT_LAST_FRAME) * last:
         return None
-    conditions.record_assumption(f"ruptured at {hours:g} h by its label '{quoted(label)}'")
+    conditions.record_assumption(f"{'ruptured' if last else 'ended'} at {hours:g} h by its label '{quoted(label)}'")
     return StatedNumber(hours * SECONDS_PER_HOUR, label, conditions.location)
 
 

@@ -128,8 +128,10 @@ INDEXED_FILES = IndexedFolderReader(
     vocabulary=HeaderVocabulary(
         synonyms={"creep_extension_pct": "strain_pct"},
         end_of_test_terms={"Not applicable": "stopped"},
-        ignored=("T_top_C", "T_mid_C", "T_bot_C"),
-        labels=("orientation_deg", "gauge_Le_mm", "duration_h", "elong_pct", "elastic_ext_pct", "init_plastic_pct"),
+        labels=(
+            *("orientation_deg", "gauge_Le_mm", "duration_h", "elong_pct", "elastic_ext_pct", "init_plastic_pct"),
+            *("T_top_C", "T_mid_C", "T_bot_C"),
+        ),
     ),
 )
 """How BAM keeps the creep curves of CMSX-6, with three thermocouples (doi 10.5281/zenodo.13937986)."""

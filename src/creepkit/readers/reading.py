@@ -17,7 +17,7 @@ from creepkit.files.delimited_text import refuse_unprintable
 from creepkit.files.reading import read_bytes
 from creepkit.hookspecs import hookimpl
 from creepkit.readers.creep_schema_json import CREEP_SCHEMA
-from creepkit.readers.history_csv import HISTORY_CSV
+from creepkit.readers.history_csv import HISTORY_CSV, TEXT_SUFFIXES
 from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET, read_sheets
@@ -177,9 +177,10 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     for general in GENERAL_READERS:
         if len(accepting) > 1:
             accepting = [reader for reader in accepting if reader.name not in general]
+    if not accepting and path.suffix.lower() in TEXT_SUFFIXES:  # whose error says what it lacks
+        accepting = [reader for reader in readers if reader.name == HISTORY_CSV.name]
     if not accepting:
-        reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
-        raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")
+        raise HistoryError(f"{path}: no reader understands it; known are {', '.join(one.name for one in readers)}")
     return only_one("reader", path, accepting, "reader")
 
 
@@ -187,8 +188,8 @@ def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:
     """The histories with names of their own: the folder's name in front where a name comes twice."""
     counts = Counter(history.name for _, history in read)
     histories = [
-        history.replace(name=f"{_folder(path)}/{history.name}") if counts[history.name] > 1 else history
-        for path, history in read
+        h.replace(name=f"{(p if p.is_dir() else p.absolute().parent).name}/{h.name}") if counts[h.name] > 1 else h
+        for p, h in read
     ]
     seen: dict[str, str] = {}
     for history in histories:
@@ -197,7 +198,3 @@ def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:
             raise HistoryError(f"two tests are called '{history.name}', in {both}; rename one of them")
         seen[history.name] = history.source
     return histories
-
-
-def _folder(path: Path) -> str:
-    return (path if path.is_dir() else path.absolute().parent).name

@@ -106,13 +106,13 @@ def names_time(table: CellTable, vocabulary: HeaderVocabulary) -> bool:
 
 
 def _row_of_names(table: CellTable, known: Terms) -> int:
-    """The first row that names a time among texts alone; the first of all where there is none."""
+    """The first row that names a time among texts alone; else that above the first frame, or the first of all."""
     for k, row in enumerate(table.rows[:_MOST_ROWS]):
         cells = [cell for cell in row.cells if cell]
         is_text = not any(is_number(cell, table.dialect) for cell in cells)
         if is_text and any(is_time(cell, known) for cell in cells) and (len(cells) > 1 or k == 0):
             return k
-    return 0
+    return next((k for k, row in enumerate(table.rows[1:_MOST_ROWS]) if is_frame(row, table)), 0)
 
 
 def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:

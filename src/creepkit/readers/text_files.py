@@ -155,18 +155,14 @@ _RULE = re.compile(r"[|:\-\s]*")
 
 def _under_names(line: str, names: str, place: str) -> list[str]:
     """The cells of a row of units, each in the column of the name above it, whose middle is nearest to its own."""
-    units, columns = (
-        [(0.5 * (one.start() + one.end()), one[0]) for one in re.finditer(r"\S+", text.expandtabs())]
-        for text in (line, names)
-    )
-    cells, at = [""] * len(columns), -1
-    for middle, unit in units:
-        nearest = min(range(len(columns)), key=lambda k: abs(columns[k][0] - middle))
-        if nearest <= at:
-            what = f"{len(units)} units below {len(columns)} names; write - below a column without a unit"
-            raise HistoryError(f"{place}: {what}")
-        cells[nearest], at = unit, nearest
-    return cells
+    units, columns = ([*re.finditer(r"\S+", text.expandtabs())] for text in (line, names))
+    middles = [sum(one.span()) for one in columns]
+    found = [min(range(len(columns)), key=lambda k: abs(middles[k] - sum(one.span()))) for one in units]
+    if found != sorted({*found}):
+        what = f"{len(units)} units below {len(columns)} names; write - below a column without a unit"
+        raise HistoryError(f"{place}: {what}")
+    named = dict(zip(found, (one[0] for one in units), strict=True))
+    return [named.get(k, "") for k in range(len(columns))]
 
 
 # ---- the head ------------------------------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
         *("probentemperatur", "ofen", "ofentemperatur", "temperatur ofen", "température", "température d'essai"),
-        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai"),
+        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai", "prüftemp", "versuchstemp", "probentemp"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),

@@ -193,7 +193,7 @@ def _usual_errors(fit: Identification) -> list[str]:
 
 WEIGHTS = {
     "likelihood": 'the intervals rest on the likelihood (weights "likelihood"): readings count by their noise',
-    "noise": 'the intervals rest on readings of equal weight (weights "noise") and all the scatter that was estimated',
+    "equal": 'the intervals rest on readings of equal weight (weights "equal") and all the scatter that was estimated',
 }
 """{weights of a fit: what its intervals rest on}."""
 

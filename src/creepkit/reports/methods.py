@@ -194,7 +194,7 @@ def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
     if "search_ends" in fit.provenance:
         points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
         yield f"Up to {plural(settings.starts, 'start')} were picked out of {points} (seed {settings.seed})."
-    if settings.weights == "noise":
+    if settings.weights == "equal":
         yield "Values were found by least squares of readings of equal weight."
     components = "White and autocorrelated noise, offsets and the scatter of rates"
     yield f"{components} were estimated by restricted maximum likelihood{cite('reml')}."

@@ -31,7 +31,7 @@ files = ["*.csv"]
 
 [identification]
 laws = ["norton", "strain-hardening"]
-weights = "noise"
+weights = "equal"
 
 [[forecast]]
 name = "longer test"
@@ -91,7 +91,7 @@ def samples() -> Iterator[ReaderSample]:
     study = document(
         "study", "study.toml", STUDY.encode(), read_study_file, "title files laws weights load end_h target"
     )
-    keys = ('title = "Planted creep curves"\n', 'files = ["*.csv"]\n', 'weights = "noise"\n', "end_h = 2000\n")
+    keys = ('title = "Planted creep curves"\n', 'files = ["*.csv"]\n', 'weights = "equal"\n', "end_h = 2000\n")
     yield ReaderSample(**{**study.__dict__, "repeated": keys})
     files = [Attachment("study.toml", STUDY.encode()), Attachment("data/a.csv", NODES.encode())]
     report = f"<!doctype html><html><body>{embed(files)}</body></html>".encode()

@@ -68,11 +68,11 @@ def test_a_law_of_the_command_line_has_its_changes_in_its_files(tmp_path: Path) 
 
 def test_weights_that_select_does_not_take_are_an_error() -> None:
     tests = ck.read_histories(ck.example_data("planted creep curves"))
-    with pytest.raises(FitError, match="compares laws by their likelihood, found weights='noise'"):
-        ck.select(["norton", "strain-hardening"], tests, weights="noise")
+    with pytest.raises(FitError, match="compares laws by their likelihood, found weights='equal'"):
+        ck.select(["norton", "strain-hardening"], tests, weights="equal")
     for of_settings in (lambda s: ck.select(["norton"], tests, settings=s), lambda s: ck.ScreeningOptions(settings=s)):
-        with pytest.raises(FitError, match="compares laws by their likelihood, found weights='noise'"):
-            of_settings(ck.IdentificationSettings(weights="noise"))
+        with pytest.raises(FitError, match="compares laws by their likelihood, found weights='equal'"):
+            of_settings(ck.IdentificationSettings(weights="equal"))
 
 
 def test_options_for_measured_tests_are_refused_with_identifications() -> None:
@@ -107,7 +107,7 @@ def read(option, text):
 
 
 def test_words_and_numbers_by_name():
-    assert read("weights", "noise") == "noise"
+    assert read("weights", "equal") == "equal"
     assert read("usual_errors", "none") == "none"
     assert read("usual_errors", "temperature=3, load=0.01") == {"temperature": 3.0, "load": 0.01}
 

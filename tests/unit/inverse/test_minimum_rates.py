@@ -84,7 +84,7 @@ def test_derivatives_are_those_of_the_rate():
 # ---- identification -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("weights", ["noise", "likelihood"])
+@pytest.mark.parametrize("weights", ["equal", "likelihood"])
 def test_rates_alone_are_a_linear_regression(weights):
     """ln rate = ln A + n ln s - Q/R (1/T - 1/T0): values, and intervals with Student's t of tests less parameters."""
     from scipy.stats import t as student

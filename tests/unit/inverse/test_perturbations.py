@@ -176,12 +176,12 @@ def test_independent_errors_of_rates_average_out_as_in_least_squares_of_equal_we
 
 
 def test_values_of_frames_of_equal_weight_move_as_these_are_weighted():
-    """weights="noise", against identifications with the offset in one test after the other; few frames weigh little."""
+    """weights="equal", against identifications with the offset in one test after the other; few frames weigh little."""
     tests = [
         planted(NORTON, {"A": 1e-15, "n": 4.0}, [(s, 1000.0)], seed=k, rate=0.2, noise=2e-5, frames=frames)[0]
         for k, (s, frames) in enumerate([(60.0, 120), (64.0, 12), (68.0, 120), (72.0, 12)])
     ]
-    settings = replace(SETTINGS, weights="noise", nuisances=(Nuisance("rate"),))
+    settings = replace(SETTINGS, weights="equal", nuisances=(Nuisance("rate"),))
     fit = identify(NORTON, tests, Steady(), settings=settings)
     effect = next(e for e in fit.unmodelled if e.kind == "offset of strain")
     stress, changes = fit.reference.stress, []

@@ -74,7 +74,7 @@ def lengths_of_one(tests, fit):
 
 MISTAKES = [
     (settings(starts=0), "starts is 0"),
-    (settings(weights="none"), "weights is 'none'; allowed is 'automatic', 'noise' or 'likelihood'"),
+    (settings(weights="none"), "weights is 'none'; allowed is 'automatic', 'equal' or 'likelihood'"),
     (settings(rupture_times="never"), "rupture_times is 'never'; allowed is 'auto', 'use' or 'ignore'"),
     (nuisances(Nuisance("offset", mean=0.01, sd=1e-3)), "about zero"),
     (nuisances(Nuisance("thickness", sd=0.02, scope="all")), "'thickness' is a length in mm and needs its prior mean"),

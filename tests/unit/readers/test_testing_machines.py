@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from helpers.command_line import creepkit
 
 MODULUS, STRESS, RAMP = 155e3, 120.0, 60.0
 AREA, LENGTH = 0.25 * math.pi * 8.0**2, 50.0
@@ -157,3 +158,25 @@ def test_times_to_strains_under_bare_heads_of_a_french_table_and_an_end_in_a_wor
     assert [one.rupture_time for one in (second, third)] == [None, None]
     assert second.unruptured
     assert third.unruptured
+
+
+def test_a_text_table_without_a_time_is_told_what_lacks_and_a_log_of_transducers_is_a_test(tmp_path: Path) -> None:
+    """Not which readers there are, and not the record of an instrument."""
+    (tmp_path / "b.txt").write_text("Creep of bar 3\nload  strain_pct stress_MPa\n1 0.0 100\n2 0.1 100\n")
+    with pytest.raises(ck.errors.HistoryError, match="b.txt:2: missing column: no time among load, strain_pct, stress"):
+        ck.read_histories(tmp_path / "b.txt")
+    head = "Width,0.5,in\n\nElapsed (hh:mm:ss),Load (lbf),Ext A (in),Ext B (in)\n"
+    (tmp_path / "SR-4.csv").write_text(head + "0:00:00,0,0,0\n0:00:01,9,1,1\n0:01:00,9,2,2\n")
+    assert "'Ext A (in)' and 'Ext B (in)' seem to be sensors" in creepkit("read", tmp_path / "SR-4.csv").output
+
+
+def test_a_run_out_whose_time_stands_in_a_remark_that_was_answered(tmp_path: Path) -> None:
+    (tmp_path / "z.csv").write_text(
+        "Probe;Prüftemp. in °C;σ in MPa;Bruchzeit in h;Bem.\nZ1;600;330;9783;\nZ4;600;200;n.b.;Laufzeit 40215 h\n"
+    )
+    (tmp_path / "tests.toml").write_text('["z.csv"]\nended = {"Laufzeit 40215 h" = "stopped"}\n')
+    first, second = ck.read_histories(tmp_path / "z.csv")
+    assert first.temperature == pytest.approx(873.15)
+    assert first.rupture_time == pytest.approx(9783 * 3600)
+    assert second.unruptured
+    assert second.times[-1] == pytest.approx(40215 * 3600)

@@ -186,7 +186,7 @@ def test_the_scatter_between_tests_is_in_the_misfit_of_the_common_rate_alone() -
 # The plot of a ranking: misfits of each law in each test, weights, and the curves of the credible laws.
 
 
-BY_NOISE = IdentificationSettings(starts=2, sobol_points=16, frames=20, weights="noise")
+BY_NOISE = IdentificationSettings(starts=2, sobol_points=16, frames=20, weights="equal")
 
 
 @pytest.fixture(scope="module")
