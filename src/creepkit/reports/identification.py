@@ -276,7 +276,7 @@ def _sums(fit: Identification) -> list[str]:
         known = [one.ratio for one in values if not one.censored and math.isfinite(one.ratio)]
         inside = sum(one.low <= one.measured <= one.high for one in values if not one.censored)
         if known:
-            span = f"{min(known):.2g} to {max(known):.2g}, median {median(known):.3g}"
+            span = f"{min(known):.3g} to {max(known):.3g}, median {median(known):.3g}"
             lines.append(
                 f"{len(known)} {what}: predicted over measured {span}; {inside} within the 95 % interval of a single "
                 f"test{_if_the_law_holds(fit)}"

@@ -175,7 +175,7 @@ FORECAST = {
     # a caution
     "outside": "what was measured of {tests} lies outside its band or interval",
     # a caution, of a contradicted law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals hold one of {here} here",
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals allow for {here} here",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated

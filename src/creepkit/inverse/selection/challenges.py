@@ -233,8 +233,8 @@ class AlteredLaw:
             return f"fits better (its chi-square is {-self.excess:.1f} lower)"
         if abs(self.excess) < SMALLEST_SHOWN:
             return "explains them as well (its chi-square is the same)"
-        side = "higher" if self.excess > 0 else "lower"
-        return f"explains them as well (its chi-square is {abs(self.excess):.1f} {side})"
+        how, side = ("is not excluded", "higher") if self.excess > 0 else ("explains them as well", "lower")
+        return f"{how} (its chi-square is {abs(self.excess):.1f} {side})"
 
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:

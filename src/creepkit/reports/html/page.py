@@ -266,7 +266,11 @@ def _sections_of(
         values = value_blocks(fit, ranking.verdict, equivalents_among_remaining(ranking))
     yield PageSection(f"{prefix}values", "Values and verdict", values, result=said)
     worst = worst_tests(fit)[:1]
-    far = f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}" if len(fit.tests) > 1 and worst else ""
+    far = (
+        f"; farthest from the law: {printable(fit.tests[worst[0]].name, 60)}"
+        if rejected(fit) and len(fit.tests) > 1 and worst
+        else ""
+    )
     tests = blocks_of_tests(fit, figures, of=found.of, most=most)
     yield PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}{far}")
     if ranking is not None:

@@ -130,7 +130,7 @@ def test_a_planted_threshold_that_a_power_law_follows_is_not_decided_against():
     (found,) = challenges_of([norton])
     assert found.kind == "threshold"
     assert found.subject == "norton above a threshold"
-    assert f"of {THRESHOLD * norton.reference.stress:.3g} MPa explains them as well" in found.sentence
+    assert f"of {THRESHOLD * norton.reference.stress:.3g} MPa " in found.sentence
 
 
 # ---- unmodelled effects ------------------------------------------------------------------------------------------
