@@ -66,7 +66,7 @@ def test_the_answer_is_one_screen(browser, tmp_path) -> None:
     for part in (".lead", ".answer .seen svg", ".answer .card dl"):
         box = page.locator(part).first.bounding_box()
         assert box["y"] + box["height"] <= 900
-    assert page.locator(".cautions li").count() <= 3
+    assert page.locator("#findings .cautions li").count() <= 3
     assert len(page.locator("body").inner_text().split()) <= 700
     assert page.evaluate("document.documentElement.scrollHeight") <= 4 * 900
     page.context.close()
