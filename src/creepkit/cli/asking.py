@@ -59,9 +59,13 @@ def _answer_to(question: Question, answer: Callable[[str], str]) -> Answer | Non
         tell(f"  {number}  {_in_words(choice)}{' [Enter]' if number == 1 else ''}")
     count = len(question.choices)
     listed = f"{'1 to ' * (count > 1)}{count}" if count else ""
-    asked = " or ".join(filter(None, (listed, "what it is" if question.is_free else "")))
+    free = "what it is" if listed else question.key
+    asked = " or ".join(filter(None, (listed, free if question.is_free else "")))
     while True:
-        typed = answer(f"{asked}, {LEAVE_OPEN} leaves it open: ").strip()
+        try:
+            typed = answer(f"{asked}, {LEAVE_OPEN} leaves it open: ").strip()
+        except EOFError:
+            raise HistoryError(f"the input ended; the same command goes on from what {ANSWERS_FILE} holds") from None
         if typed == LEAVE_OPEN:
             return None
         chosen = typed or "1"

@@ -14,6 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
+from creepkit.readers.compression import as_compressed, is_compression
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -116,6 +117,10 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
+    if "strain" in outputs and specimen == "uniaxial" and is_compression(conditions, name):
+        loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
+        strain_measure = "logarithmic"
+        conditions.record_assumption("compression: its area grows, by which stresses are true ones", first=True)
     if "strain" in outputs:
         stress = loading.program().at(frames.times) if loading.quantity == "stress" else None
         modulus = None if elastic is None else _modulus(elastic, temperature)

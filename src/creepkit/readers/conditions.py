@@ -106,7 +106,7 @@ class StatedConditions:
         self.end_terms = {word.casefold(): end for word, end in vocabulary.end_of_test_terms.items()}
         self._numbers: dict[str, StatedNumber] = {}
         self._texts: dict[str, SourceText] = {}
-        self._assumptions: list[str] = []
+        self.assumed: list[str] = []
         self._locations: dict[str, str] = {}
         errors = list[HistoryError]()
         for key, entry in entries.items():
@@ -152,7 +152,7 @@ class StatedConditions:
         entry = self._texts.pop(key, None)
         if entry is None and required and key in self._vocabulary.default_texts:
             entry = SourceText(self._vocabulary.default_texts[key], "assumed by the layout")
-            self._assumptions.append(f"{key} {entry.text}")
+            self.assumed.append(f"{key} {entry.text}")
         if entry is None:
             return ""
         if entry.text not in allowed:
@@ -174,7 +174,7 @@ class StatedConditions:
 
     def record_assumption(self, what: str, *, first: bool = False) -> None:
         """Record in the label "assumed" what the file leaves unsaid; first : before all others."""
-        self._assumptions.insert(0 if first else len(self._assumptions), what)
+        self.assumed.insert(0 if first else len(self.assumed), what)
 
     def location_of(self, *keys: str) -> str:
         """The place of the first of these numbers and texts that was given, else that of the test."""
@@ -205,7 +205,7 @@ class StatedConditions:
                 raise HistoryError(f"{location}: '{key}': {what} or steps of strain where the strain was held")
             raise HistoryError(f"{location}: '{key}' has no meaning beside the others; {_ALLOWED_COMBINATIONS}")
         earlier = [self.labels["assumed"]] if self.labels.get("assumed") else []
-        new = [one for one in self._assumptions if not earlier or one not in earlier[0]]
+        new = [one for one in self.assumed if not earlier or one not in earlier[0]]
         assumed = ", ".join(dict.fromkeys([*earlier, *new]))
         return {**self.labels, **({"assumed": assumed} if assumed else {})}
 

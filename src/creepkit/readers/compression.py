@@ -1,0 +1,41 @@
+"""Compression tests: a piece that is pressed gains area, where a bar under tension loses it.
+
+A file tells them by a word, or by negative stresses and strains. With e = 1 - h / h_0 of the height the logarithmic
+strain is -ln(1 - e), and the true stress the nominal one times 1 - e, which is what a law of a bar is given.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.readers.conditions import StatedConditions
+from creepkit.records import Loading, Program, RecordedLoading
+from creepkit.records.loading import held_of
+
+WORDS = re.compile(r"compress|druckkriech|stauch", re.IGNORECASE)
+"""Of a test that presses, in English, French and German."""
+
+
+def is_compression(conditions: StatedConditions, name: str) -> bool:
+    """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
+    said = (name, *conditions.labels, *conditions.labels.values(), *conditions.assumed)
+    return any(WORDS.search(text) for text in said)
+
+
+def as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:
+    """The loading with the true stress, and the logarithmic strain, a shortening, of a piece that is compressed.
+
+    times, strain : (frames,) s and -, of which shortening may be negative; measure : "engineering" or "logarithmic".
+    """
+    known = np.isfinite(strain)
+    shortening = -strain if strain[known].sum() < 0.0 else strain
+    if measure == "engineering":
+        shortening = -np.log1p(-np.minimum(shortening, 0.99))
+    if loading.quantity != "stress" or held_of(loading) == "stress" or not known.any():
+        return loading, shortening
+    at = np.concatenate([[0.0], times[known & (times > 0.0)]])
+    grown = np.interp(at, times[known], shortening[known])
+    return RecordedLoading(Program(at, loading.program().at(at) * np.exp(-grown)), "stress", "stress"), shortening

@@ -1,0 +1,24 @@
+"""Compression tests, whose area grows: told by a word or by signs, and read with their true stress."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+
+LOAD, RATE, N = 80.0, 2e-8, 4.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("title", ["# label test: Compression creep, Gleeble", "# label Versuch: Druckkriechversuch"])
+def test_a_compressed_piece_has_logarithmic_strains_and_its_true_stress(tmp_path, title, sign):
+    """A power law in closed form: d(strain)/dt = r exp(-n strain) under a load, so strain = ln(1 + n r t) / n."""
+    times = np.linspace(0.0, 2000.0, 41)[1:]
+    strain = np.log1p(N * RATE * 3600.0 * times) / N
+    rows = "\n".join(f"{t:.1f},{sign * 100.0 * -np.expm1(-e):.6f}" for t, e in zip(times, strain, strict=True))
+    text = f"{title}\n# stress_MPa: {LOAD}\n# temperature_C: 950\ntime_h,strain_%\n{rows}\n"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    (one,) = ck.read_histories(tmp_path / "a.csv")
+    np.testing.assert_allclose(one.outputs["strain"], strain, atol=2e-8)
+    assert one.strain_measure == "logarithmic"
+    np.testing.assert_allclose(one.loading.program().at(one.times), LOAD * np.exp(-strain), rtol=1e-6)
+    assert one.labels["assumed"].startswith("compression")
