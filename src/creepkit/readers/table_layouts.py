@@ -534,19 +534,21 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
 
 
 def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
-    """The table without texts right of its named columns, which become notes, and without remarks below its frames.
+    """The table without texts right of its named columns, which become notes, and without remarks amid its frames.
 
     What says so of the latter is returned. Numbers beside the columns are told by who reads them.
     """
-    count, footers = len(table.rows), list[str]()
-    while count > 2 and _is_remark(row := table.rows[count - 1], table):
-        count -= 1
+    footers, frames = list[str](), list[TableRow]()
+    for k, row in enumerate(table.rows):
+        if k < 2 or not _is_remark(row, table) or (table.rows[k + 1 :] and _begins_again(table.rows, k, table)):
+            frames.append(row)
+            continue
         text = " ".join(filter(None, row.cells))
         if end_said_by(text):
             notes[f"label remark line {row.line}"] = SourceText(text, table.location(row.line))
-        footers.insert(0, f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
+        footers.append(f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
     rows, width = list[TableRow](), max((k for k, cell in enumerate(table.rows[0].cells, 1) if cell), default=0)
-    for row in table.rows[:count]:
+    for row in frames:
         beside = [cell for cell in row.cells[width:] if cell]
         if not beside or any(is_number(cell, table.dialect) for cell in beside):
             rows.append(row)
@@ -555,6 +557,14 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
         if any(row.cells[:width]):
             rows.append(TableRow(row.line, row.cells[:width]))
     return replace(table, rows=rows), footers
+
+
+def _begins_again(rows: Sequence[TableRow], k: int, table: CellTable) -> bool:
+    """Whether frames of another test follow a row of text: their first number falls, or is neither number nor clock."""
+    before, after = (row.cells[0] if row.cells else "" for row in (rows[k - 1], rows[k + 1]))
+    if is_number(before, table.dialect) and is_number(after, table.dialect):
+        return float_of(after) < float_of(before)
+    return not all(_DAY.fullmatch(cell) or is_clock_time(cell) for cell in (before, after))
 
 
 def _is_remark(row: TableRow, table: CellTable) -> bool:

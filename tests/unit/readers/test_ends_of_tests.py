@@ -369,3 +369,18 @@ def test_tables_drawn_with_bars_and_rates_with_a_dot_above(tmp_path):
     (tmp_path / "b.txt").write_text(f"Table 2. Mg-Al\n{dotted}", "utf-8")
     rates = [one.minimum_rate for one in ck.read_histories(tmp_path / "b.txt")]
     assert rates == pytest.approx([1.17e-9, 3.12e-9])
+
+
+@pytest.mark.parametrize("is_clock", [True, False])
+def test_a_remark_amid_the_frames_is_a_note_and_a_title_of_another_test_is_none(tmp_path, is_clock):
+    text = "# stress_MPa: 140\n# temperature_C: 650\nDatum;Uhrzeit;strain_%\n" if is_clock else "time_h;strain_%\n"
+    text = text if is_clock else f"# stress_MPa: 140\n# temperature_C: 650\n{text}"
+    rows = [f"0{1 + k}.03.2025;08:00:00;{0.1 * k:.1f}" if is_clock else f"{24 * k};{0.1 * k:.1f}" for k in range(6)]
+    remark = "power failure, furnace cold - restart" + ";" * (1 + is_clock)
+    (tmp_path / "a.csv").write_text(text + "\n".join([*rows[:4], remark, *rows[4:]]))
+    (one,) = ck.read_histories(tmp_path / "a.csv")
+    np.testing.assert_allclose(one.times, 86400.0 * np.arange(6))
+    assert "line 8 is a remark (power failure" in one.labels["assumed"]
+    (tmp_path / "a.csv").write_text(text + "\n".join([*rows, "another bar of the heat" + ";" * (1 + is_clock), *rows]))
+    with pytest.raises(HistoryError):
+        ck.read_histories(tmp_path / "a.csv")
