@@ -28,6 +28,7 @@ from scipy.stats import norm, qmc
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.errors_of_tests import LIFE, RATE, errors_of_tests
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.minimum_rates import with_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
@@ -411,13 +412,10 @@ class PlannedOutcomes:
             self._known.setdefault(test_key(history), [[under[0] for under in by_law] for by_law in outcomes])
         mask, nuisances = observations.present[0], nuisances_of_planned(known, [history])
         u = known.fit.u + deviations[:, : known.size]
-        prediction = known.measured.predictor.predict(
-            known.fit.law,
-            known.fit.coordinates.theta(u),
-            [history],
-            nuisances=nuisances.predictor_values(values_of_nuisances(nuisances, known)),
-            sensitivities=True,
-        )
+        predictor, tests = known.measured.predictor, (known.fit.law, known.fit.coordinates.theta(u), [history])
+        given = nuisances.predictor_values(values_of_nuisances(nuisances, known))
+        prediction = predictor.predict(*tests, nuisances=given, sensitivities=True)
+        prediction = with_minimum_rates(prediction, predictor, *tests, given, sensitivities=True)
         values, internal = candidate_residuals(observations, prediction)
         assert internal is not None
         of_u = np.einsum("cep,cpq->ecq", internal[:, 0], known.fit.coordinates.jacobian(u))

@@ -271,3 +271,16 @@ def test_any_load_is_varied_in_its_unit_after_the_ramp_that_was_made():
         assert loading.quantity == "force"
         assert loading.program().values[0] == 0.0
         assert loading.program().times[1] == 30.0
+
+
+def test_tables_of_minimum_rates_have_a_next_test_that_tells_laws_apart():
+    """Rates of sinh(s / 60 MPa)^3 at 40 to 90 MPa: with half a decade of stress a power law is hard to tell from it."""
+    stresses, rng = (40.0, 50.0, 60.0, 75.0, 90.0), np.random.default_rng(2)
+    rates = 1e-9 * np.sinh(np.array(stresses) / 60.0) ** 3 * np.exp(0.05 * rng.standard_normal(5))
+    tests = [
+        ck.History(f"r{k}", np.array([3.6e6]), {}, ck.constant_stress(s), 873.15, minimum_rate=float(r))
+        for k, (s, r) in enumerate(zip(stresses, rates, strict=True))
+    ]
+    designed = ck.design(ck.select(["norton", "hyperbolic-sine"], tests, further_laws=0, starts=2))
+    assert designed.goal == "law"
+    assert len(designed.tests) >= 1
