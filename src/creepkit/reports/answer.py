@@ -299,7 +299,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
-        factor, unit = (100.0, "%") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
+        factor, unit = (100.0, "% (absolute)") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
         kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"

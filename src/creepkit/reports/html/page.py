@@ -257,7 +257,8 @@ def _sections_of(
     """What was found of one material behind its answer; most : tests that are drawn, drawn : whether its ranking is."""
     fit, ranking = found.fit, found.ranking
     loose = sum(e.verdict in LOOSE for e in fit.estimates)
-    said = f"{loose or 'none'} of {plural(len(fit.estimates), 'value')} hardly determined by these tests"
+    known = plural(len(fit.estimates), "value")
+    said = f"{loose} of {known} hardly determined by these tests" if loose else f"{known} determined by these tests"
     if isinstance(found.result, AlloyResult):
         values = [*value_blocks(fit, found.result.verdict, found.result.equivalents), Items(found.result.notes)]
     elif ranking is None:
