@@ -117,7 +117,7 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
-    if "strain" in outputs and specimen == "uniaxial" and is_compression(conditions, name):
+    if "strain" in outputs and loading.quantity == "stress" and is_compression(conditions, name):
         loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression: its area grows, by which stresses are true ones", first=True)

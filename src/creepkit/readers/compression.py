@@ -26,7 +26,7 @@ def is_compression(conditions: StatedConditions, name: str) -> bool:
 
 
 def as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:
-    """The loading with the true stress, and the logarithmic strain, a shortening, of a piece that is compressed.
+    """The loading with the true stress, and the logarithmic shortening (frames,) -, of a piece that is compressed.
 
     times, strain : (frames,) s and -, of which shortening may be negative; measure : "engineering" or "logarithmic".
     """
@@ -34,7 +34,7 @@ def as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str)
     shortening = -strain if strain[known].sum() < 0.0 else strain
     if measure == "engineering":
         shortening = -np.log1p(-np.minimum(shortening, 0.99))
-    if loading.quantity != "stress" or held_of(loading) == "stress" or not known.any():
+    if held_of(loading) == "stress" or not known.any():
         return loading, shortening
     at = np.concatenate([[0.0], times[known & (times > 0.0)]])
     grown = np.interp(at, times[known], shortening[known])

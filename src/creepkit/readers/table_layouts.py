@@ -534,13 +534,11 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
 
 
 def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
-    """The table without texts right of its named columns, which become notes, and without remarks amid its frames.
-
-    What says so of the latter is returned. Numbers beside the columns are told by who reads them.
-    """
+    """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
     for k, row in enumerate(table.rows):
-        if k < 2 or not _is_remark(row, table) or (table.rows[k + 1 :] and _begins_again(table.rows, k, table)):
+        after = table.rows[k + 1 : k + 2]
+        if k < 2 or not _is_remark(row, table) or any(_begins_again(table.rows[k - 1], one, table) for one in after):
             frames.append(row)
             continue
         text = " ".join(filter(None, row.cells))
@@ -559,12 +557,11 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
     return replace(table, rows=rows), footers
 
 
-def _begins_again(rows: Sequence[TableRow], k: int, table: CellTable) -> bool:
-    """Whether frames of another test follow a row of text: their first number falls, or is neither number nor clock."""
-    before, after = (row.cells[0] if row.cells else "" for row in (rows[k - 1], rows[k + 1]))
-    if is_number(before, table.dialect) and is_number(after, table.dialect):
-        return float_of(after) < float_of(before)
-    return not all(_DAY.fullmatch(cell) or is_clock_time(cell) for cell in (before, after))
+def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
+    """Whether frames of another test follow a row of text: a number that falls, or what is neither it nor a clock."""
+    cells = before.cells[0], after.cells[0]
+    known = [float_of(cell) for cell in cells if is_number(cell, table.dialect)]
+    return known[1] < known[0] if known[1:] else not all(_DAY.fullmatch(cell) or is_clock_time(cell) for cell in cells)
 
 
 def _is_remark(row: TableRow, table: CellTable) -> bool:

@@ -304,7 +304,7 @@ def test_a_law_that_the_search_holds_says_so_first() -> None:
 
 def test_laws_of_equal_weights_are_compared_at_their_optima_under_the_common_covariance() -> None:
     """No other values of a law have a smaller chi-square there: those of the identification itself have none."""
-    fits = [one.fit for one in ranking_by("noise", wide=True).laws]
+    fits = [one.fit for one in ranking_by("equal", wide=True).laws]
     at_optimum = under_common_covariance(fits).chi_square
     problem = fits[0].least_squares_problem
     for fit, least in zip(fits, at_optimum, strict=True):
