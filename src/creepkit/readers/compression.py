@@ -15,14 +15,18 @@ from creepkit.readers.conditions import StatedConditions
 from creepkit.records import Loading, Program, RecordedLoading
 from creepkit.records.loading import held_of
 
-WORDS = re.compile(r"compress|druckkriech|stauch", re.IGNORECASE)
-"""Of a test that presses, in English, French and German."""
+WORDS = re.compile(r"\bcompress(?:ion|ive|ed)\b|druckkriech|stauchversuch", re.IGNORECASE)
+"""Of a test that presses, in English, French and German; a compressor disc is none."""
+
+
+TENSION = re.compile(r"tensi|traction|zug", re.IGNORECASE)
+"""Beside them of a machine for both."""
 
 
 def is_compression(conditions: StatedConditions, name: str) -> bool:
     """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
     said = (name, *conditions.labels, *conditions.labels.values(), *conditions.assumed)
-    return any(WORDS.search(text) for text in said)
+    return any(WORDS.search(text) and not TENSION.search(text) for text in said)
 
 
 def as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:

@@ -22,3 +22,13 @@ def test_a_compressed_piece_has_logarithmic_strains_and_its_true_stress(tmp_path
     assert one.strain_measure == "logarithmic"
     np.testing.assert_allclose(one.loading.program().at(one.times), LOAD * np.exp(-strain), rtol=1e-6)
     assert one.labels["assumed"].startswith("compression")
+
+
+@pytest.mark.parametrize("label", ["part: compressor disc", "rig: tension-compression", "Maschine: Zug-Druck"])
+def test_a_bar_of_a_compressor_or_of_a_rig_for_both_is_in_tension(tmp_path, label):
+    (tmp_path / "a.csv").write_text(
+        f"# label {label}\n# stress_MPa: 80\n# temperature_C: 950\ntime_h,strain_%\n1,1\n2,2\n"
+    )
+    (one,) = ck.read_histories(tmp_path / "a.csv")
+    assert one.strain_measure == "engineering"
+    np.testing.assert_allclose(one.loading.program().at(one.times), 80.0)
