@@ -38,6 +38,12 @@ _SAMPLE_LINES, _SAMPLE_CHARACTERS = 200, 4000
 """Lines, and characters of each, that decide on the delimiter; on the decimal sign all lines decide."""
 
 
+class AmbiguousNumber(HistoryError):
+    """A number with one comma before three digits where no other tells what the comma is; number : as it is written."""
+
+    number: str
+
+
 @dataclass(frozen=True)
 class Dialect:
     r"""How a table is written as text.
@@ -154,8 +160,8 @@ def text_lines(text: str) -> list[str]:
 def detect_dialect(lines: Iterable[str], location: str = "", decimal: str | None = None) -> Dialect:
     """The dialect of the lines of a table: its line of names and its rows, without comments.
 
-    decimal : the decimal sign, where it is known. HistoryError, beginning with `location`, where
-    `1,234` may be 1234 as well as 1.234, and no other number tells.
+    decimal : the decimal sign, where it is known. AmbiguousNumber, beginning with `location`, where `1,234` may be 1234
+    as well as 1.234, and no other number tells.
     """
     filled = (line for line in lines if line and not line.isspace())
     sample = list(islice(filled, _SAMPLE_LINES))
@@ -324,11 +330,15 @@ def _decimal(lines: Iterable[str], delimiter: str, place: str) -> str:
             elif "." in cell and NUMBERS["."].fullmatch(cell):
                 points += 1
     if doubtful and not commas and not points:
-        raise HistoryError(
-            f"{place}'{doubtful}' may be {doubtful.replace(',', '.')} or {doubtful.replace(',', '')}; write decimal "
-            "points, or '# decimal: comma' in the head of the file"
-        )
+        error = AmbiguousNumber(f"{place}{two_readings(doubtful)}; write decimal points and no separators")
+        error.number = doubtful
+        raise error
     return "," if commas > points else "."
+
+
+def two_readings(number: str) -> str:
+    """What a number with one comma before three digits may be."""
+    return f"'{number}' may be {number.replace(',', '.')} or {number.replace(',', '')}"
 
 
 def _possible_numbers(line: str, delimiter: str) -> list[str]:

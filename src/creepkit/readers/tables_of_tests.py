@@ -30,7 +30,14 @@ from creepkit.readers.columns_of_tests import (
 )
 from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
-from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
+from creepkit.readers.table import (
+    CellTable,
+    SourceText,
+    TableRow,
+    cells_of_width,
+    with_commas_of_remarks,
+    without_ignored,
+)
 from creepkit.readers.table_heads import conditions_in_text, sources_of_names
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
@@ -159,6 +166,7 @@ class TestTable:
         known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
         heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
         body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
+        body = with_commas_of_remarks(sheet, body, head.names)
         below = replace(sheet, rows=[TableRow(line, list(head.names)), *body])
         below = without_ignored(below, 0, self.vocabulary.ignored)
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)

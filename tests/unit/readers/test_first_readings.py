@@ -68,7 +68,21 @@ def test_logarithms(read):
     assert first.minimum_rate == pytest.approx(1e-4 / 3600)
     assert "'log10(t_r/h)' is a decimal logarithm" in first.labels["assumed"]
     with pytest.raises(HistoryError, match="is a rate that is not understood; is it a minimum creep rate?"):
-        read(LOGARITHMS.replace("minimum rate", "rate"))
+        read(LOGARITHMS.replace("minimum rate", "strain rate"))
+
+
+@pytest.mark.parametrize("head", ["rate/h-1", "rate / h⁻¹", "rate/(1/h)", "Kriechrate / h^-1", "log10(rate/h-1)"])
+def test_units_behind_a_stroke_as_din_1313_and_iupac_write_them(read, head):
+    rate = -5.0 if head.startswith("log") else 1e-5
+    tests = read(f"No.;T/°C;sigma/MPa;{head}\n1;600;80;{rate}\n2;600;90;{rate}\n")
+    assert [one.minimum_rate for one in tests] == [pytest.approx(1e-5 / 3600)] * 2
+
+
+@pytest.mark.parametrize(("head", "scale"), [("strain/10^-2", 1e-2), ("ε / 10⁻³", 1e-3), ("Dehnung/(%)", 1e-2)])
+def test_strains_and_times_behind_a_stroke(read, head, scale):
+    (test,) = read(f"Creep at 600 °C and 80 MPa\nt/(h);{head}\n0;0\n1;0.5\n2;0.75\n")
+    np.testing.assert_allclose(test.outputs["strain"], scale * np.array([0.0, 0.5, 0.75]))
+    assert test.times[-1] == 7200.0
 
 
 def test_blocks_below_one_another(read):

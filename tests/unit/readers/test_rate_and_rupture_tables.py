@@ -105,6 +105,49 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+LONGER = {
+    "a decimal comma before a column of words": ("rupture_h,heat", "8200,5,X7", "12500,X8"),
+    "before a column of numbers": ("rupture_h,grain size", "8200,5,40", "12500,41"),
+    "before a remark": ("rupture_h,remark", "8200,5,broke", "12500,broke"),
+    "before a heat and a remark": ("rupture_h,heat,remark", "8200,5,X7,broke", "12500,X8,broke"),
+    "in the last column": ("rupture_h", "8200,5", "12500"),
+}
+
+
+@pytest.mark.parametrize("case", LONGER)
+def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path, case):
+    """8200,5 h without quotes takes two cells, and had been read as 8200 h."""
+    head, longer, row = LONGER[case]
+    with pytest.raises(HistoryError, match=r"table.csv:2: number of cells \d, of columns \d; .* decimal comma"):
+        read(tmp_path, f"test,stress_MPa,temperature_C,{head}\nA1,120,750,{longer}\nA2,100,750,{row}\n")
+
+
+def test_commas_of_a_remark_in_the_last_column_are_its_own(tmp_path):
+    text = "test,stress_MPa,temperature_C,rupture_h,remark\nA1,120,750,8200,broke, necked\nA2,100,750,9000,broke\n"
+    assert read(tmp_path, text)[0].labels["remark"] == "broke, necked"
+    with pytest.raises(HistoryError, match="table.csv:4: number of cells 4, of columns 3"):
+        read(tmp_path, "time (h),strain (%),remark\n0,0,start\n1,0.1,\n2,5,0.2,ok\n3,0.3,\n")
+
+
+def test_commas_between_thousands(tmp_path):
+    text = "test;stress (MPa);T (C);t_r (h)\nA;120.5;750;21,251\nB;140;750;>3,101\nC;160;750;911\n"
+    tests = read(tmp_path, text)
+    assert [one.times[-1] / 3600 for one in tests] == [21251.0, 3101.0, 911.0]
+    assert "commas stand between thousands (21251)" in tests[0].labels["assumed"]
+    single = text.replace(">3,101", "3101")
+    with pytest.raises(HistoryError, match=r"table.csv:2: '21,251' may be 21.251 or 21251; write into tests.toml"):
+        read(tmp_path, single)
+    doubtful = text.replace("120.5", "120")
+    with pytest.raises(
+        HistoryError, match=r"may be 21.251 or 21251; .* decimal = \"comma\" \(or decimal = \"point\"\)"
+    ):
+        read(tmp_path, doubtful)
+    for answer, hours in (("comma", 21.251), ("point", 21251.0)):
+        (tmp_path / "tests.toml").write_text(f'["table.csv"]\ndecimal = "{answer}"\n')
+        assert read(tmp_path, doubtful)[0].times[-1] == pytest.approx(3600 * hours)
+    assert read(tmp_path, single)[0].times[-1] == 21251.0 * 3600
+
+
 def test_ends_that_contradict_one_another(tmp_path):
     head = "stress_MPa,temperature_C,t_r_h,ended\n"
     for end, said in (
