@@ -38,8 +38,8 @@ _KNOWN = [
 ]
 
 
-MINUTES_AND_SECONDS = re.compile(r"(?<![a-z:])(?:m|mm|min):(?:s|ss|sec)(?![a-z])", re.IGNORECASE)
-"""A unit of cells such as 12:30 that makes them 12.5 min, where a clock shows hours and minutes."""
+MINUTES_AND_SECONDS = re.compile(r"(?<![a-z:])(?:(?:m|mm|min):(?:s|ss|sec)|d+:h+(?::m+)?)(?![a-z])", re.IGNORECASE)
+"""A unit of cells such as 12:30 that makes them 12.5 min, or days and hours, where a clock shows hours and minutes."""
 
 
 def _unit(text: str) -> Unit | None:

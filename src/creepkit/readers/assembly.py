@@ -506,6 +506,10 @@ def _standard_deviations(
 def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     """Which frames a fit may use: those marked so, up to the end of the test; later ones saw the unloading."""
     used = np.asarray(frames.values.get("used", np.ones(frames.times.size)) == 1.0)
+    for label, text in conditions.labels.items():
+        if label.startswith("line ") and _EXTRAPOLATED.search(text):
+            used &= frames.lines != int(label[5:])
+            conditions.record_assumption(f"the {text} reading of {label} is not used".replace(",", ";"))
     end = conditions.take_number("end_time")
     if end is None:
         return used
@@ -515,6 +519,10 @@ def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     if after.any():
         conditions.labels["frames_after_end"] = str(int(after.sum()))
     return used & ~after
+
+
+_EXTRAPOLATED = re.compile(r"extrapol|estimat|geschätzt|estimé", re.IGNORECASE)
+"""Of a remark beside what is no reading."""
 
 
 def _end_of_test(

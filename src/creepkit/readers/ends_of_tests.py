@@ -97,6 +97,12 @@ _DOUBTFUL = _words(
 """Words of what breaks in the place of a test, of what it broke by, or that it broke when the test was over."""
 
 
+_METHOD = _words(
+    r"(?:creep |stress |zeitstand)?rupture (?:test|testing|tests|machine|rig|curve|data)|essais? de (?:fluage )?rupture"
+)
+"""Names of the method, which say nothing of an end."""
+
+
 @lru_cache(maxsize=4096)
 def plain_words(text: str) -> str:
     """A text in small letters without accents, its words one blank apart, and | between its clauses."""
@@ -121,6 +127,7 @@ def end_said_by(text: str) -> str:
     plain, said = plain_words(text), set[str]()
     if plain.endswith("?"):
         return UNCLEAR if end_said_by(plain.rstrip("? ")) else ""
+    plain = _METHOD.sub(" ", plain)
     for pattern, what in ((_UNBROKEN, STOPPED), (_UNCENSORED, RUPTURED)):
         plain, count = pattern.subn(" ", plain)
         said |= {what} if count else set()
@@ -132,8 +139,12 @@ def end_said_by(text: str) -> str:
             said.add(STOPPED)
             clause = goes_on.sub(" ", clause)
         if breaks.search(clause):
+            subjects = re.findall(rf"([^\W\d]\w*) (?:{_RUPTURE})(?!\w)", clause)
             is_doubtful = (
-                _DOUBTFUL.search(f"{clause} | {aside}") or _EXPECTED.search(clause) or _words(_NOT).search(clause)
+                _DOUBTFUL.search(f"{clause} | {aside}")
+                or _EXPECTED.search(clause)
+                or _words(_NOT).search(clause)
+                or not all(_NEUTRAL.fullmatch(one) or _BEFORE_RUPTURE.fullmatch(one) for one in subjects)
             )
             without = re.search(rf"(?:{_RUPTURE}) (?:without|ohne|sans) ", clause)
             said.add(UNCLEAR if is_doubtful and not without else RUPTURED)
@@ -217,6 +228,17 @@ _NEUTRAL = _words(
     r"intergranulaire\w*|transgranulaire\w*|oxyd\w*|et|tete|mode|[a-z]{0,3}\d[\w]*",
 )
 """Words of remarks that tell something else than an end: what a specimen looks like, where it stems from."""
+
+
+_BEFORE_RUPTURE = _words(
+    _RUPTURE,
+    r"is|was|has|had|have|been|it|then|finally|later|tests?|piece|to|until|till|by|when|after|stress|strain|tertiary|final",
+    r"early|late|premature\w*|suddenly?|complete\w*|fully?|partial\w*|clean|shear|tensile|cone|metal|haz|iv|material",
+    r"base|parent|found|ended|ends?|ran|on|due|time|h|hours?|days?|reached|steel|alloy|not|ist|wurde|war|hat|bis|zum|zu",
+    r"nach|durch|mit|am|dann|endgultig\w*|prufling|probekorper|stab|werkstoff|vorzeitig\w*|est|ete|s|eprouvettes?|apres",
+    r"puis|par|jusqu|en|brutale?|nette|finale?|prematuree?|essai|metaux|duktiler|l",
+)
+"""Words that stand before one of rupture where the specimen broke: any other is of what else did."""
 
 
 def is_neutral(text: str) -> bool:

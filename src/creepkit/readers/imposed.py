@@ -6,6 +6,7 @@ and recorded, or asked for.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from math import erf
@@ -146,11 +147,20 @@ def _control(conditions: StatedConditions, *, varies: bool) -> str:
     if meant and not conditions.states("control"):
         conditions.record_assumption(f"control {meant}, for the stress is the {measure} one")
         return meant
+    held = [(k, text) for k, text in conditions.labels.items() if _TRUE_STRESS_HELD.search(text)]
+    if held and not meant and not conditions.states("control"):
+        what = f"'{held[0][0]}' says '{held[0][1]}'; was the true stress held, or the load?"
+        raise conditions.question(what, "control", "stress", "load", is_free=False)
     control = conditions.take_choice("control", ("load", "stress"), required=True)
     if varies and meant and control != meant:
         what = f"stress_measure is {measure} and control is {control}, but an engineering stress that changes is a load"
         raise HistoryError(f"{location}: {what}, and a true one a stress; keep one of the two")
     return control
+
+
+_TRUE_STRESS_HELD = re.compile(
+    r"constant (?:true )?stress|konstante[rn]? (?:wahre[rn]? )?spannung|contrainte (?:vraie )?constante", re.IGNORECASE
+)
 
 
 def _step_change(conditions: StatedConditions, quantity: str) -> TwoLevels | None:

@@ -132,6 +132,7 @@ def without_clocks(table: CellTable, known: Terms) -> CellTable:
     return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
 
 
+_PART = re.compile(r"part(?:ie)?|teil|segment|run|lauf|section|abschnitt|phase", re.IGNORECASE)
 _GROUP = "test no"
 """Name of the column that numbers the tests of a table whose times begin anew."""
 
@@ -157,7 +158,13 @@ def with_names(table: CellTable, known: Terms) -> CellTable:
         ]
         for k in unknown if len(starts) > 2 else ():
             texts = [{row.cells[k] for row in table.rows[a:b]} - {""} for a, b in pairwise(starts)]
-            keys += [k] if {*map(len, texts)} == {1} and len(set.union(*texts)) == len(texts) else []
+            if {*map(len, texts)} == {1} and len(set.union(*texts)) == len(texts):
+                if _PART.fullmatch(name := table.columns[k]):
+                    what = (
+                        f"'{name}' numbers parts whose clock begins anew; are they tests of their own? If not, let the"
+                    )
+                    raise column_question(table, f"{what} time go on", {name: "test"})
+                keys.append(k)
     return replace(table, columns=[_GROUP if k in keys[:1] else one for k, one in enumerate(table.columns)])
 
 

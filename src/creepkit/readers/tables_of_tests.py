@@ -28,7 +28,7 @@ from creepkit.readers.columns_of_tests import (
     quantity_of,
     unit_of_times,
 )
-from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column, plain_words
+from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
 from creepkit.readers.table import (
     CellTable,
@@ -146,6 +146,11 @@ class TestTable:
     def entry(self, row: TestRow, k: int) -> SourceText:
         """A cell of a row; of a number without separators between thousands, with a decimal point."""
         text, decimal = row.cells[k], self.table.dialect.decimal
+        if self.columns[k].kind is TIME and (match := TIME_IN_CELL.fullmatch(text)) and match["after"]:
+            unit = unit_suffix(match["after"].split(" ")[0].rstrip(".,;()"))
+            if unit in TIME.units and unit != self.columns[k].unit:
+                what = f"'{quoted(self.names[k], 60)}' is in {self.columns[k].unit}, and '{quoted(text)}' in {unit}"
+                raise HistoryError(f"{self.table.location(row.line)}: {what}; write it in {self.columns[k].unit}")
         if self.columns[k].kind or re.fullmatch(r"[+-]?\d*,\d+", text):
             text, decimal = plain_number(text, decimal)
         if self.columns[k].factor != 1.0 and is_number(text, Dialect(decimal=decimal)):

@@ -151,6 +151,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
     ),
+    "specimen": (
+        *("specimen type", "specimen form", "specimen shape", "specimen geometry", "type of specimen", "probenform"),
+        *("probentyp", "probengeometrie", "type d'éprouvette", "forme d'éprouvette"),
+    ),
     "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
     "name": ("test name", "test id", "test", "試験片番号"),
     "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
