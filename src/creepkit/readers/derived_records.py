@@ -208,7 +208,8 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
             area = float(np.median(column[on][held:])) / nominal.value
             how = f" by which the load that was held is {nominal.value:g} MPa"
     elif "stress" in values or conditions.states_load("stress"):
-        if nominal is not None and stated is not None and area is not None:
+        has_lever = any(map(_LEVER.search, conditions.labels))
+        if nominal is not None and stated is not None and area is not None and not has_lever:
             of_load = stated.value / area
             if abs(of_load - nominal.value) > LOAD_AGREEMENT * nominal.value:
                 what = f"the load makes {of_load:.4g} MPa on {area:.4g} mm2{how}, and {nominal.location} says"

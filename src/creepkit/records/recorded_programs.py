@@ -23,7 +23,7 @@ makes no breakpoints."""
 
 
 FAULT = 20.0
-"""Standard deviations off its neighbours beyond which a reading is a fault of the sensor."""
+"""Standard deviations off the median of its neighbours beyond which a reading is a fault of the sensor."""
 
 
 SURE_DRIFT = 0.01
@@ -49,7 +49,8 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     followed = running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
     at_breakpoints: Floats = values[kept]
-    sound = np.where(np.abs(values - followed) > FAULT * noise, followed, values)
+    off = np.abs(values - followed)
+    sound = np.where(off > max(tolerance, FAULT * 1.4826 * float(np.median(off))), followed, values)
     if noisy and kept.size == 2 and not _drifts(times, values):
         at_breakpoints = np.full(2, sound.mean())
     elif noisy:
