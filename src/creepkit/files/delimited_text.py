@@ -17,6 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, HistoryError, quoted
+from creepkit.files.time_stamps import is_clock_time
 
 ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#CALC!", "#####")
 """What spreadsheets write for a value that could not be computed or shown; no remark begins so."""
@@ -71,12 +72,6 @@ NUMBERS = {
 
 _GROUPED = re.compile(r"[+-]?\d+(?:[.,'’  \s]\d+)+(?:[eEdD][+-]?\d+)?", re.ASCII)
 """Digits in groups, with several separators or with one that is no decimal sign."""
-
-
-_CLOCK_TIME = re.compile(
-    r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ] *\d.{0,20})?|\d{1,6}:\d{2}(?::\d{2}(?:[.,]\d{1,12})?)?"
-)
-"""A date, a time stamp or an elapsed time: as sound a cell as a number."""
 
 
 _WITH_UNIT = re.compile(r"[+-]?\d[\d.,]* ?[^\W\d_].{0,10}|[+-]?\d[\d.,]* ?°[CFK]")
@@ -300,7 +295,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = NUMBERS["."].fullmatch(cell) or (delimiter != "," and NUMBERS[","].fullmatch(cell))
-                numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
+                numbers += 1 if is_numeric or is_clock_time(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
     return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
 
 

@@ -155,7 +155,15 @@ def end_said_by(text: str) -> str:
     return said.pop() if len(said) == 1 else UNCLEAR if said or goes_no_more or _ENDED.search(plain) else ""
 
 
-_INVALID = _words(r"invalid\w*|void|not valid|disregard|ungultig\w*|nicht gultig|verworfen|non valides?|invalides?|nul")
+_INVALID = re.compile(
+    r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
+    r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
+    r"|ne pas utiliser|non valide|not valid|disregard|verworfen|\binvalid\b|\bessai (?:nul|invalide)\b",
+    re.IGNORECASE,
+)
+"""What a laboratory writes of a test that does not count."""
+
+
 _ELSEWHERE = re.compile(
     r"outside(?: of)?(?: the)? ga[u]?ge|out of ga[u]?ge|ausserhalb (?:der )?mess|hors (?:de )?(?:la )?(?:longueur|zone)"
     r"|(?:at|in|near) (?:the )?(?:grips?|shoulders?|fillets?|threads?)|grip failure"
@@ -166,7 +174,7 @@ _ELSEWHERE = re.compile(
 def invalidity_said_by(text: str) -> Literal["invalid", "elsewhere", ""]:
     """Whether a text says that a test is invalid, or that it broke elsewhere than in its gauge length."""
     plain = plain_words(text)
-    return "invalid" if _INVALID.search(plain) else "elsewhere" if _ELSEWHERE.search(plain) else ""
+    return "invalid" if _INVALID.search(text) else "elsewhere" if _ELSEWHERE.search(plain) else ""
 
 
 YES = frozenset(

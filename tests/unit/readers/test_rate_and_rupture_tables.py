@@ -199,23 +199,6 @@ def test_a_column_of_specimens_names_the_tests(tmp_path):
     assert [h.name for h in ck.read_histories(path)] == ["P1", "P2"]
 
 
-def test_rows_that_state_nothing_but_ignored_columns_are_left_out(tmp_path):
-    text = "test,stress_MPa,T (C),minimum_rate_1/h,t_r (h)\nA,100,700,1e-6,1000\nB,80,700,,5000\nC,90,700,,>9000\n"
-    path = tmp_path / "table.csv"
-    path.write_text(text)
-    assert [h.name for h in ck.read_histories(path)] == ["A", "B", "C"]
-    (rate,) = ck.read_histories(path, ignore=["t_r (h)"])
-    assert (rate.name, rate.end_known) == ("A", False)
-    assert "without B C (nothing but ignored columns)" in rate.labels["assumed"]
-    ends = ck.read_histories(path, ignore=["minimum_rate_1/h"])
-    assert [h.minimum_rate for h in ends] == [None] * 3
-    with pytest.raises(HistoryError, match="no row states a minimum creep rate or an end of its test once the ignored"):
-        ck.read_histories(path, ignore=["minimum_rate_1/h", "t_r (h)"])
-    path.write_text(text.replace(",,5000", ",,"))
-    with pytest.raises(HistoryError, match="no minimum creep rate and no end"):
-        ck.read_histories(path)
-
-
 @pytest.mark.parametrize(
     "known",
     [
