@@ -23,11 +23,11 @@ from creepkit.inverse.compared_tests import common_rupture_times
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.initial_search import StartingEstimate, search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
 from creepkit.inverse.search.multistart import refined
+from creepkit.inverse.selection.discrimination import score_under_own_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.selection.select import as_shown
 from creepkit.inverse.settings import IdentificationSettings
@@ -156,6 +156,7 @@ class _Search:
     progress: Callable[[str, int, int], None] | None
     screened: dict[Sentence, RateFit] = field(default_factory=dict)
     fits: dict[Sentence | str, Identification] = field(default_factory=dict)
+    scores: dict[Sentence | str, float] = field(default_factory=dict)
     failed: dict[Sentence | str, str] = field(default_factory=dict)
     registered: list[Sentence | str] = field(default_factory=list)
     expanded: set[Sentence] = field(default_factory=set)
@@ -263,8 +264,10 @@ class _Search:
 
     def score(self, key: Sentence | str) -> float:
         """The criterion of a quick identification."""
-        fit = self.fits[key]
-        return -2.0 * fit.log_likelihood + bic_penalty(len(fit.law.params), fit.effective_frames)
+        if key not in self.scores:
+            fit = self.fits[key]
+            self.scores[key] = score_under_own_covariance(fit, fit.linear_problem, fit.effective_frames)
+        return self.scores[key]
 
     def best(self, count: int, among: Collection[Sentence | str] | None = None) -> list[Any]:
         """The keys of lowest criterion, of sentences or `among` others."""

@@ -10,7 +10,9 @@ import sympy
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.evidence import occam_penalty
 from creepkit.inverse.identify import identify
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.perturbation_trials import Challenge
@@ -72,18 +74,9 @@ def test_a_search_that_did_not_converge_is_repeated(ranking):
     assert found.values["n"] == pytest.approx(4.0, rel=0.02)
 
 
-def test_the_criteria_are_their_formulas(ranking):
-    """BIC and AICc of the same chi-squares, by hand."""
-    chi2 = np.array([r.chi_square for r in ranking.laws])
-    count = np.array([len(r.fit.u) for r in ranking.laws])
-    bic = chi2 + count * np.log(ranking.independent_frames)
-    assert [r.excess for r in ranking.laws] == pytest.approx(bic - bic[0], abs=1e-6)
-    weights = np.exp(-0.5 * (bic - bic.min()))
-    assert [r.weight for r in ranking.laws] == pytest.approx(weights / weights.sum(), rel=1e-9)
-    fits = [r.fit for r in ranking.laws]
-    n = ranking.independent_frames
-    aicc = chi2 + 2 * count + 2 * count * (count + 1) / (n - count - 1)
-    assert [r.excess for r in rank(fits, "aicc").laws] == pytest.approx(np.sort(aicc - aicc.min()), abs=1e-6)
+def test_weights_are_those_of_the_evidence(ranking):
+    odds = np.exp(-0.5 * np.array([r.excess for r in ranking.laws]))
+    assert [r.weight for r in ranking.laws] == pytest.approx(odds / odds.sum(), rel=1e-9)
 
 
 def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
@@ -251,7 +244,7 @@ def test_decisive_is_a_law_asked_for_that_explains_has_the_weight_and_stands_eve
 def test_scores_are_ordered_and_weighted():
     """exp(-excess / 2) over its sum."""
     fits = [fit(name) for name in ("norton", "sinh", "theta")]
-    found = ranking_from_scores(fits, np.array([12.0, 10.0, 14.0]), "bic", independent_frames=40.0)
+    found = ranking_from_scores(fits, np.array([12.0, 10.0, 14.0]))
     assert [r.fit.law.name for r in found.laws] == ["sinh", "norton", "theta"]
     assert [r.excess for r in found.laws] == pytest.approx([0.0, 2.0, 4.0])
     weights = np.exp([0.0, -1.0, -2.0])
@@ -265,10 +258,10 @@ def test_a_law_that_does_not_predict_every_test_is_never_first(score):
     """Of readings that it does not predict a law has no misfit: its criterion is no smaller for them."""
     adequacy = EXPLAINS.with_unpredicted(("bar 1",) if score == score else ())
     fits = [fit("norton", adequacy), fit("sinh"), fit("theta")]
-    found = ranking_from_scores(fits, np.array([score, 10.0, 12.0]), "bic", independent_frames=40.0)
+    found = ranking_from_scores(fits, np.array([score, 10.0, 12.0]))
     assert [r.fit.law.name for r in found.laws] == ["sinh", "theta", "norton"]
     assert [r.weight for r in found.laws] == pytest.approx([1 / (1 + np.exp(-1)), np.exp(-1) / (1 + np.exp(-1)), 0.0])
-    alone = ranking_from_scores(fits[:1], np.array([score]), "bic", independent_frames=40.0)
+    alone = ranking_from_scores(fits[:1], np.array([score]))
     assert not alone.decisive
 
 
@@ -349,6 +342,25 @@ def law(seed, size=1.0, **changes):
     return SimpleNamespace(
         linear_problem=linear, noise_model=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1)
     )
+
+
+def test_the_evidence_is_the_probability_of_the_readings_with_the_parameters_integrated_out():
+    """ln det of the covariance of the readings of a law that is linear: of noise, of rates and of its parameters."""
+    linear, noise, sd = law(0).linear_problem, law(0).noise_model, np.array([3.0, 0.2, 40.0])
+    ones, clock = linear.residuals.values**0, linear.residuals.correlation_coordinate
+    jacobian = np.stack([ones, clock, 0.0 * ones], axis=-1)  # the level, the slope, and what changes nothing
+    ends = np.array([[-1.0], [1.0]]) * 1e9
+    linear = LinearisedProblem(
+        replace(linear.residuals, jacobian=jacobian), sd**-2, np.zeros(3), sd > 0, ends * np.ones(3), np.zeros(3)
+    )
+    factor = CovarianceFactor.of_residuals(linear.residuals, noise)
+    rates = np.kron(np.eye(TESTS), np.ones((ENTRIES, ENTRIES))) * 0.5**2
+    rows = jacobian.reshape(-1, 3) * sd
+    whole = np.eye(TESTS * ENTRIES) + rates + rows @ rows.T
+    assert occam_penalty(linear, factor) + factor.log_determinant == pytest.approx(np.linalg.slogdet(whole)[1])
+    level, nothing = (occam_penalty(linear.of([k]), factor) for k in (0, 2))
+    assert level == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))
+    assert nothing == 0.0
 
 
 def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
