@@ -24,7 +24,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
-from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, evidence_weights
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_EXCESS, DECISIVE_WEIGHT, evidence_weights
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.discrimination import RatesOverTests, under_common_covariance, usual_errors
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
@@ -234,12 +234,15 @@ def rank(
     failed: Mapping[str, str] | None = None,
     *,
     further: Collection[str] = (),
+    further_parts: Sequence[int] = (),
     challenge: bool = True,
 ) -> Ranking:
     """Rank identifications made from the same histories, with weights and a verdict.
 
     further : names of laws that nobody asked for. One that the tests contradict, too, comes last where it predicts
         tests worse, each left out, than a law that was asked for: it only bends further to the curves at hand.
+    further_parts : of each law, how many terms and factors a search gave it: before the tests the odds are 19 to 1
+        against each, for the evidence is indifferent to one that changes nothing.
     challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
         is decisive.
     """
@@ -252,6 +255,7 @@ def rank(
         )
     common = under_common_covariance(fits, [usual_errors(fit) for fit in fits])
     score = np.where(_are_outdone(fits, further), np.inf, common.scores)
+    score += DECISIVE_EXCESS * np.array(further_parts or [0] * len(fits))
     ranking = ranking_from_scores(
         fits, score, chi_square=common.chi_square,
         failed=failed, rates=RatesOverTests(fits),
