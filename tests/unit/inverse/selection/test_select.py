@@ -117,7 +117,7 @@ def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
 # ---- where no candidate explains the tests -------------------------------------------------------------------------
 
 NAN = float("nan")
-LEAVES = Adequacy("leaves a discrepancy", (), 5.0, 100.0, 1e-9, NAN, None)
+LEAVES = Adequacy((OutputAdequacy("strain", 120, 2e-5, "stated", 5.0, 1e-9, 4e-5),), 5.0, 100.0, 1e-9, NAN, None)
 
 
 def tried(*adequacies, laws=("norton", "hyperbolic-sine")):
@@ -175,7 +175,7 @@ def test_a_contradicted_law_that_nobody_asked_for_has_to_predict_tests_better():
         for name, error in zip(names, errors, strict=True)
     ]
     assert _are_outdone(fits, ("better", "worse")) == [False, False, True]
-    fits[2].adequacy = replace(LEAVES, verdict="explains")
+    fits[2].adequacy = EXPLAINS
     assert _are_outdone(fits, ("better", "worse")) == [False, False, False]
 
 
@@ -197,12 +197,12 @@ def test_further_laws_are_tried_within_their_budget_and_are_proposals():
 
 
 STRAIN = OutputAdequacy("strain", 120, 2e-5, "stated", 1.02, 0.4, 0.0)
-EXPLAINS = Adequacy("explains", (STRAIN,), 1.02, 117.0, 0.4, NAN, None)
+EXPLAINS = Adequacy((STRAIN,), 1.02, 117.0, 0.4, NAN, None)
 LEFT = Adequacy(
-    "leaves a discrepancy", (replace(STRAIN, chi_square=5.0, p_value=1e-20, discrepancy=4e-5),), 5.0, 117.0, 1e-20, 0.3,
+    (replace(STRAIN, chi_square=5.0, p_value=1e-20, discrepancy=4e-5),), 5.0, 117.0, 1e-20, 0.3,
     LargestDeviation("bar 1", "strain", 5400.0, 4e-5, 2.0),
 )  # fmt: skip
-UNKNOWN = Adequacy("cannot be judged", (), NAN, 0.0, NAN, NAN, None)
+UNKNOWN = Adequacy((), NAN, 0.0, NAN, NAN, None)
 SUM = Challenge("sum", "norton+sinh", "norton+sinh with 30 % of the rate from sinh explains them as well")
 DRIFT = Challenge("unmodelled effect", "temperature drift", "a temperature drift would leave it a weight of 0.52")
 
@@ -256,7 +256,7 @@ def test_scores_are_ordered_and_weighted():
 @pytest.mark.parametrize("score", [8.0, NAN], ids=["test not predicted", "misfit is no number"])
 def test_a_law_that_does_not_predict_every_test_is_never_first(score):
     """Of readings that it does not predict a law has no misfit: its criterion is no smaller for them."""
-    adequacy = EXPLAINS.with_unpredicted(("bar 1",) if score == score else ())
+    adequacy = replace(EXPLAINS, unpredicted=("bar 1",) if score == score else ())
     fits = [fit("norton", adequacy), fit("sinh"), fit("theta")]
     found = ranking_from_scores(fits, np.array([score, 10.0, 12.0]))
     assert [r.fit.law.name for r in found.laws] == ["sinh", "theta", "norton"]
@@ -266,7 +266,7 @@ def test_a_law_that_does_not_predict_every_test_is_never_first(score):
 
 
 def test_what_is_not_predicted_has_no_positive_verdict():
-    missing = EXPLAINS.with_unpredicted(("bar 1", "bar 2"))
+    missing = replace(EXPLAINS, unpredicted=("bar 1", "bar 2"))
     for more in ({"weights": [0.99, 0.01]}, {"weights": [0.6, 0.4]}, {"weights": [0.99, 0.01], "further": ("norton",)}):
         found = ranking_of(more.pop("weights"), [missing, missing], **more)
         assert not found.singled_out
