@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
@@ -84,8 +84,7 @@ def _table(ranking: Ranking) -> Table:
         )
         for one in ranking.laws
     ]
-    behind = f"{ {'bic': 'BIC', 'aicc': 'AICc'}[ranking.criterion] } - best"
-    columns = ("law", "parameters", "mean misfit", "test to test", behind, "weight", "chi-square", "by the noise")
+    columns = ("law", "parameters", "mean misfit", "test to test", "behind", "weight", "chi-square", "by the noise")
     return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
 
 
@@ -120,7 +119,7 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
             name: getattr(ranking, name)
             for name in ("verdict", "decisive", "adequacy", "further", "failed", "challenges")
         },
-        "laws": [{**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in ranking.laws],
+        "laws": [{**_fit_to_json(one.fit), "excess": one.excess, "weight": one.weight} for one in ranking.laws],
         "files": [str(path) for path in written],
     }
 
