@@ -74,11 +74,6 @@ def test_a_search_that_did_not_converge_is_repeated(ranking):
     assert found.values["n"] == pytest.approx(4.0, rel=0.02)
 
 
-def test_weights_are_those_of_the_evidence(ranking):
-    odds = np.exp(-0.5 * np.array([r.excess for r in ranking.laws]))
-    assert [r.weight for r in ranking.laws] == pytest.approx(odds / odds.sum(), rel=1e-9)
-
-
 def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
     """Creep strain grows a thousandfold over a test: hardening by m changes rates by 1000^m."""
     ranking = ck.select(
