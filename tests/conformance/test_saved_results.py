@@ -34,7 +34,7 @@ def whole_identification() -> ck.Identification:
     settings = {"weights": "likelihood", "nuisances": [ck.Nuisance("offset"), ck.Nuisance("rate", sd=0.2)]}
     fit = ck.identify("norton", [h.replace(standard_deviation={"strain": 1e-6}) for h in tests], starts=1, **settings)
     adequacy = Adequacy(
-        "leaves a discrepancy", (OutputAdequacy("strain", 80, 2e-5, "estimated", 3.25, 1e-4, 3e-5),), 3.25, 78.0, 1e-4,
+        (OutputAdequacy("strain", 80, 2e-5, "estimated", 3.25, 1e-4, 3e-5),), 3.25, 78.0, 1e-4,
         0.4, LargestDeviation("bar 1", "strain", 5400.0, -4e-5, 2.0), ("thickness", "offset of strain"),
         critical_chi_square=1.5, smallest_p_value=5e-5,
     )  # fmt: skip
@@ -135,7 +135,7 @@ def test_a_damaged_file_is_an_answer_or_one_sentence(kind: str, documents: dict[
 @pytest.mark.parametrize(
     ("path", "value", "words"),
     [
-        (("adequacy", "verdict"), "splendid", "adequacy.verdict"),
+        (("adequacy", "outputs", 0, "noise_source"), "splendid", "adequacy.outputs.0.noise_source"),
         (("adequacy", "outputs", 0, "noise"), 0.0, "adequacy.outputs.0.noise"),
         (("numerical_error", "noises"), -1.0, "numerical_error.noises"),
         (("unmodelled", 1, "size"), -0.5, "unmodelled.1.size"),

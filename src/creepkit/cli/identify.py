@@ -120,9 +120,9 @@ def command(
         return
     _tell_assumptions(histories)
     candidates = LawChanges().changed(changes).applied(candidates, histories)
-    compared = search.sums is not None or ("criterion" in how and len(candidates) > 1)
+    compared = search.sums is not None
     if compared and not by_likelihood(search, chosen):
-        raise FitError("--sums and --criterion compare laws by their likelihood: leave out --weights, --penalty")
+        raise FitError("--sums compares laws by their likelihood: leave out --weights, --penalty")
     check_identified_folder(to, candidates)
     options_of_fits: dict[str, Any] = {"compared": compared, **({} if through is None else {"through": through})}
     with ProgressBar() as progress:

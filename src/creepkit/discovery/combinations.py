@@ -24,7 +24,7 @@ from creepkit.arrays import Floats
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
 from creepkit.discovery.regression import FormCombination, IsothermalEstimates, regress
 from creepkit.errors import CreepkitError, FitError
-from creepkit.inverse.information_criteria import criterion_weights
+from creepkit.inverse.evidence import evidence_weights
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.jobs.progress import duration_text
 from creepkit.language import CreepLaw
@@ -126,7 +126,7 @@ def rank_combinations(
     else:
         reason = next(iter(cache.failed.values()), "none within its bounds has fewer numbers than these points allow")
         raise FitError(f"no combination of forms of {', '.join(names)} is possible: {reason}")
-    excess, weights = criterion_weights(scores)
+    excess, weights = evidence_weights(scores)
     combinations = [
         replace(admissible[k], criterion_difference=float(excess[k]), weight=float(weights[k])) for k in order
     ]

@@ -4,7 +4,7 @@ Regression on estimates inherits how badly single temperatures determine them; t
 linearised again about the curves of the best combination, with one simulation of each test and its derivatives, which
 gives estimates that are near to one another where the first ones were at the ends of flat valleys, and all combinations
 are ranked anew. The credible ones and the simplest one, Arrhenius with every other parameter constant, are identified
-from all tests as ordinary laws and ranked by BIC; one represents those that cannot be distinguished from it.
+from all tests as ordinary laws and ranked by their evidence; one represents those that cannot be distinguished from it.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.evidence import evidence_weights
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
-from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -292,9 +292,9 @@ def weigh_refits(
     failed : {forms: why they could not be refitted}, which become notes. points : those that combinations were ranked
         on last.
     """
-    bic_differences = {id(entry.fit): entry.excess for entry in _ranked(refits).laws}
-    scores = np.array([bic_differences[id(one.fit)] - 2.0 * np.log(one.prior_odds) for one in refits])
-    excess, weights = criterion_weights(scores)
+    differences = {id(entry.fit): entry.excess for entry in _ranked(refits).laws}
+    scores = np.array([differences[id(one.fit)] - 2.0 * np.log(one.prior_odds) for one in refits])
+    excess, weights = evidence_weights(scores)
     order = np.argsort(scores, kind="stable")
     candidates = tuple(_with_numbers_of_fit(refits[k], float(excess[k]), float(weights[k])) for k in order)
     best = _identified(candidates[0].fit)
@@ -378,8 +378,8 @@ ENOUGH_CHI_SQUARE = 12.0
 """Rise of chi^2 from the best combination up to which a simpler one is refitted."""
 
 
-NEAR_BIC = 6.0
-"""BIC less the best up to which a combination is refitted with simpler forms."""
+NEAR = 6.0
+"""-2 ln of the evidence over that of the best, up to which a combination is refitted with simpler forms."""
 
 
 SIMILAR_CHI_SQUARE = 1.0
@@ -508,7 +508,7 @@ class _RefitCache:
 
         Two parameters that both have a wrong form make up for each other, so that combinations near the best count too.
         """
-        near = {id(one.fit) for one in _ranked(self.fitted.values()).laws if one.excess < NEAR_BIC}
+        near = {id(one.fit) for one in _ranked(self.fitted.values()).laws if one.excess < NEAR}
         for refit in [one for one in self.fitted.values() if id(one.fit) in near]:
             forms = list(refit.candidate_forms)
             enough = regress(points, forms).chi_square + ENOUGH_CHI_SQUARE
@@ -580,11 +580,11 @@ class _RefitCache:
 
     @property
     def best(self) -> FormCombination:
-        """The combination of lowest BIC so far; odds of forms count at the end."""
+        """The combination of most evidence so far; odds of forms count at the end."""
         best = _ranked(self.fitted.values()).best
         return next(one for one in self.fitted.values() if one.fit is best)
 
 
 def _ranked(refits: Iterable[FormCombination]) -> Ranking:
-    """The identifications of refits by BIC."""
+    """The identifications of refits by their evidence."""
     return rank([_identified(one.fit) for one in refits], challenge=False)

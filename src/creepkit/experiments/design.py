@@ -25,8 +25,8 @@ from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
 from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
 from creepkit.inverse.errors_of_tests import with_expected_scatter
+from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature
@@ -285,7 +285,7 @@ def _law_criterion(task: DesignTask, outcomes: PlannedOutcomes, seed: int) -> La
         chi_squares = np.array([law.chi_square for law in outcomes.laws[: len(task.laws)]])
     excess = np.array([r.excess for r in ranked])
     altered = [(k, one.excess, one.refuting_excess) for k, one in task.altered]
-    return LawCriterion(outcomes, task.weights, excess, chi_squares, ranking.independent_frames, altered, seed)
+    return LawCriterion(outcomes, task.weights, excess, chi_squares, altered, seed)
 
 
 def notes_of(laws: Sequence[Identification], rigs: Sequence[Rig]) -> tuple[str, ...]:

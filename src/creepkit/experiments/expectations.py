@@ -36,8 +36,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.experiments.planned_outcomes import Expansion, PlannedOutcomes
+from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, gradient, log_rate
 from creepkit.inverse.variance_components import scaled_inverse
@@ -184,7 +184,7 @@ class LawCriterion:
     """The laws that remain, the first of the outcomes, and after them what else a verdict has to exclude.
 
     weights : (laws,) -. excess : (laws,) of the criterion of the ranking. chi_squares : (laws,) of the tests that were
-    made. frames : how many of them are independent. altered : of the further laws, the position of the law that each
+    made. altered : of the further laws, the position of the law that each
     alters, its chi-square above that one's, and that up to which it refutes it.
     """
 
@@ -192,7 +192,6 @@ class LawCriterion:
     weights: Floats
     excess: Floats
     chi_squares: Floats
-    frames: float
     altered: Sequence[tuple[int, float, float]] = ()
     seed: int = 0
     _deviations: dict[int, Floats] = field(default_factory=dict)
@@ -231,12 +230,12 @@ class LawCriterion:
         return Expectation(max(information, 0.0), probability=right, wrong=wrong, chi_squares=tuple(chi_squares))
 
     def _penalties(self, histories: Sequence[History]) -> Floats:
-        """(laws,) growth of the penalty K ln n of BIC with the frames of these tests."""
-        if not np.isfinite(self.frames):
-            return np.zeros(len(self.names))
-        count = sum(self.outcomes.outcome(h, 0).mean.size for h in histories)
-        sizes = np.array([law.size for law in self.outcomes.laws[: len(self.names)]])
-        return np.asarray(sizes * float(np.log1p(count / self.frames)))
+        """(laws,) growth of what the parameters of each cost, as these tests narrow them further."""
+        grown = []
+        for b in range(len(self.names)):
+            A, K = self.outcomes.laws[b].information, self.outcomes.of(histories, b)[1]
+            grown.append(np.linalg.slogdet(A + K.T @ K)[1] - np.linalg.slogdet(A)[1])
+        return np.array(grown)
 
     def _increments(self, a: int, histories: Sequence[History], at_draws: bool) -> Floats:
         """(laws and altered ones, outcomes) Q of each, if a is true: over draws of its posterior and of the noise."""

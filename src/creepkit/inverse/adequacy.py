@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, SMALLEST_RATE_SCATTER
+from creepkit.limits import SIGNIFICANCE
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import time_text
 
@@ -95,17 +96,18 @@ def _amount(value: float, output: str) -> str:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """Whether a law explains the tests to their noise.
+    """What was found of whether a law explains the tests to their noise; `verdict` follows from it.
 
-    verdict : "explains", "leaves a discrepancy" or "cannot be judged". outputs : one by one; those without known noise
-    are missing. chi_square : of all of them, over `freedom`, its degrees of freedom. p_value : the least of all and of
-    each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
-    ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
+    outputs : one by one; those without known noise are missing. chi_square : of all of them, over `freedom`, its
+    degrees of freedom. p_value : the least of all and of each, times their number. correlation : of what is left, as a
+    share of the test (of outputs that span decades: the ln of a factor in time); NaN where nothing is. largest : where
+    the law misses most; None if nothing is known.
     remedies : errors that nobody modelled, with the largest size that they take in a test, such as "an error of 0.01 mm
     in the thickness", with any of which the law would explain the tests.
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them.
-    explanations : of that scatter, the likeliest first: the law's dependence on stress or temperature, one test, two
-        groups of tests (see inverse.rate_explanations).
+    of_rates : explanations of that scatter, the likeliest first: the law's dependence on stress or temperature, one
+        test, two groups of tests (see inverse.rate_explanations). outlying : one test alone that the others did not
+        lead to expect, which is no explanation.
     implausible : nuisances that lie far from their priors, without which the law would not explain the tests.
     expected_chi_square : what `chi_square` is in the mean if the law is right: above one where noise is estimated from
         few frames. critical_chi_square : the reduced chi-square beyond which the tests contradict the law.
@@ -114,11 +116,8 @@ class Adequacy:
         many frames it has, where these are too few to show the noise.
     unpredicted : tests of which nothing, or not every reading, is predicted: a law is never judged to explain them.
     contradicting : minimum rates and rupture times that contradict one another by the law, beyond their own scatter.
-    mentioned : a caution, where nothing rejects the law: an explanation of too small odds for a verdict, or one test
-    alone that the others did not lead to expect.
     """
 
-    verdict: AdequacyVerdict
     outputs: tuple[OutputAdequacy, ...]
     chi_square: float
     freedom: float
@@ -127,7 +126,8 @@ class Adequacy:
     largest: LargestDeviation | None
     remedies: tuple[str, ...] = ()
     rate_scatter: float = 0.0
-    explanations: tuple[Explanation, ...] = ()
+    of_rates: tuple[Explanation, ...] = ()
+    outlying: Explanation | None = None
     implausible: tuple[ImplausibleNuisance, ...] = ()
     expected_chi_square: float = 1.0
     not_judged: tuple[str, ...] = ()
@@ -136,7 +136,33 @@ class Adequacy:
     smallest_p_value: float = float("nan")
     unpredicted: tuple[str, ...] = ()
     contradicting: ContradictingValues | None = None
-    mentioned: Explanation | None = None
+
+    @property
+    def verdict(self) -> AdequacyVerdict:
+        """What contradicts the law comes before what is not known of it."""
+        if self.leaves_readings or self.contradicting is not None or self.contradicted_by_rates:
+            return "leaves a discrepancy"
+        return "explains" if self.outputs and not self.unpredicted else "cannot be judged"
+
+    @property
+    def leaves_readings(self) -> bool:
+        """Whether readings leave more than noise, or rates of tests scatter by more than those of one alloy do."""
+        return bool(self.outputs) and (self.p_value < SIGNIFICANCE or self.scatters_too_much)
+
+    @property
+    def contradicted_by_rates(self) -> bool:
+        """Whether rates of tests alone contradict the law: by something likelier than their scatter."""
+        return bool(self.of_rates) and self.of_rates[0].odds >= VERDICT_ODDS
+
+    @property
+    def explanations(self) -> tuple[Explanation, ...]:
+        """Of what rates of tests leave of a law that is contradicted by them or by readings, the likeliest first."""
+        return self.of_rates if self.contradicted_by_rates or self.leaves_readings else ()
+
+    @property
+    def mentioned(self) -> Explanation | None:
+        """A caution, where nothing rejects the law: an explanation of too small odds, or one test that stands out."""
+        return None if self.rejects else next(iter(self.of_rates), self.outlying)
 
     @property
     def scatters_too_much(self) -> bool:
@@ -147,21 +173,6 @@ class Adequacy:
     def explains(self) -> bool:
         """Whether the law explains the tests to their noise."""
         return self.verdict == "explains"
-
-    def with_contradicting(self, values: ContradictingValues | None) -> Adequacy:
-        """The same, rejected where minimum rates and rupture times contradict one another by the law."""
-        return self if values is None else replace(self, verdict="leaves a discrepancy", contradicting=values)
-
-    def with_explanations(self, explanations: tuple[Explanation, ...]) -> Adequacy:
-        """The same, rejected where something other than scatter explains the rates of tests, likeliest first."""
-        if explanations and not self.rejects and explanations[0].odds < VERDICT_ODDS:
-            return replace(self, mentioned=explanations[0])
-        return replace(self, verdict="leaves a discrepancy", explanations=explanations) if explanations else self
-
-    def with_unpredicted(self, tests: tuple[str, ...]) -> Adequacy:
-        """The same; not judged to explain tests that it does not predict."""
-        verdict = "cannot be judged" if tests and self.explains else self.verdict
-        return replace(self, verdict=verdict, unpredicted=tests)
 
     @property
     def lies_in_tests(self) -> bool:

@@ -47,7 +47,7 @@ def identify(
 
     law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
         the specimens that the histories name.
-    penalty : which terms of a sum are kept: "subsets", the set of lowest BIC, or "l2", the paper's norm of their
+    penalty : which terms of a sum are kept: "subsets", the set of most evidence, or "l2", the paper's norm of their
         contributions. Those left out stand in `sparsity` of the result, and its law is the one that remains.
     through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
         values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
@@ -82,7 +82,6 @@ def select(
     *,
     through: Through = "auto",
     sums: bool | None = None,
-    criterion: Literal["bic", "aicc"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     **changes: Unpack[IdentificationSettingsKeywords],
@@ -91,9 +90,8 @@ def select(
 
     laws : candidates; sums : also sums of two of them: True, False, or None, with which sums of the best law and then
         richer registered laws are tried where none explains the tests to their noise, at most `further_laws` of them.
-    criterion : of the comparison; the result is a set of laws with weights, and a verdict: "decisive" only where one
-        law of those asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands
-        against it.
+    The result is a set of laws with weights, and a verdict: "decisive" only where one law of those asked for explains
+    the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "automatic" or "likelihood".
     """
     predictor = resolve_predictors(using, histories)
@@ -108,7 +106,6 @@ def select(
         settings=settings,
         through=_resolve_through(through, predictor),
         sums=sums,
-        criterion=criterion,
         progress=progress,
     )
     notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories), *rig_notes(histories, settings))

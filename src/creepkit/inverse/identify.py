@@ -168,8 +168,8 @@ def _without_one_test(fit: Identification) -> Identification:
     except CreepkitError:
         return fit
     values = {e.name: (e.value, e.low, e.high) for e in without.estimates}
-    explanations = (replace(first, without=values), *rest)
-    return replace(fit, adequacy=replace(adequacy, explanations=explanations))
+    of_rates = (replace(first, without=values), *rest)
+    return replace(fit, adequacy=replace(adequacy, of_rates=of_rates))
 
 
 def _estimated(
@@ -415,9 +415,15 @@ def _reported(
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
-    adequacy = judge.adequacy_with_remedies(judged, unmodelled, rates.found).with_unpredicted(unpredicted)
-    adequacy = adequacy.with_contradicting(contradicting_values(histories, single_values))
-    mentioned = None if adequacy.rejects else adequacy.mentioned or rates.outlying
+    adequacy = replace(
+        judge.adequacy(judged),
+        remedies=judge.remedies(judged, unmodelled),
+        of_rates=rates.found,
+        outlying=rates.outlying,
+        implausible=implausible,
+        unpredicted=unpredicted,
+        contradicting=contradicting_values(histories, single_values),
+    )
     estimates = parameter_estimates(law, coordinates, u, law_covariance)
     return Identification(
         law=law,
@@ -438,7 +444,7 @@ def _reported(
         error_covariance=error_covariance if problem.settings.included_errors else None,
         nuisances=nuisance_estimates,
         converged=best.converged,
-        adequacy=replace(adequacy, implausible=implausible, mentioned=mentioned),
+        adequacy=adequacy,
         numerical_error=numerical_error,
         unmodelled=unmodelled,
         left_out=rates.left_out,

@@ -28,7 +28,6 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.errors_of_tests import effect_of_lives
-from creepkit.inverse.explanation import Explanation
 from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -37,7 +36,7 @@ from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
 from creepkit.inverse.perturbation import DRIFT, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, LinearSolution
+from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, is_logarithmic
 
@@ -121,8 +120,8 @@ class Judge:
         observations, judged = self.problem.observations, self.residuals(linear)
         if judged is None:
             nan = float("nan")
-            nothing = Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None, not_judged=observations.outputs)
-            return replace(nothing, few_frames=self.known.few_frames)
+            few = self.known.few_frames
+            return Adequacy((), nan, 0.0, nan, nan, None, not_judged=observations.outputs, few_frames=few)
         known, share_of_freedom = judged.known, judged.share_of_freedom
         outputs = []
         for position, name in enumerate(observations.outputs):
@@ -147,9 +146,7 @@ class Judge:
         alone = any(o.p_value < SIGNIFICANCE for o in outputs)
         left = [p_value < SIGNIFICANCE and (o.p_value < SIGNIFICANCE or not alone) for o in outputs]
         outputs = [o if kept else replace(o, discrepancy=0.0) for o, kept in zip(outputs, left, strict=True)]
-        explained = p_value >= SIGNIFICANCE and not self.noise_model.rate > 0.99 * LARGEST_RATE_SCATTER
         return Adequacy(
-            "explains" if explained else "leaves a discrepancy",
             tuple(outputs),
             reduced,
             freedom,
@@ -162,16 +159,13 @@ class Judge:
             smallest_p_value=min(p_values),
         )
 
-    def adequacy_with_remedies(
-        self, linear: LinearisedProblem, effects: Sequence[Perturbation], explanations: tuple[Explanation, ...]
-    ) -> Adequacy:
-        """The same, rejected where rates of tests are explained otherwise, with effects that would explain them.
+    def remedies(self, linear: LinearisedProblem, effects: Sequence[Perturbation]) -> tuple[str, ...]:
+        """The effects with which the law would explain the tests that it does not without, as they would have to be.
 
         A drift in one test alone is a rate that changes with time, which a law may have: nothing tells the two apart.
         """
-        adequacy = self.adequacy(linear)
-        if not adequacy.rejects:
-            return adequacy.with_explanations(explanations)
+        if not self.adequacy(linear).rejects:
+            return ()
         remedies = []
         for effect in effects:
             is_of_law = effect.common or (effect.kind == DRIFT and effect.tests == 1)
@@ -181,7 +175,7 @@ class Judge:
                 change = 100 * np.expm1(effect.per_kelvin * taken.size)
                 by_rate = f" ({change:.2g} % of the rate, by an assumed activation energy)" if effect.assumed else ""
                 remedies.append(f"{taken.description}{by_rate}")
-        return replace(adequacy, remedies=tuple(remedies)).with_explanations(explanations)
+        return tuple(remedies)
 
     @property
     def _independent_noise(self) -> NoiseModel:

@@ -87,6 +87,12 @@ class CovarianceFactor:
         return np.asarray(self.roots @ np.swapaxes(self.roots, 1, 2))
 
     @cached_property
+    def standard_deviations(self) -> Floats:
+        """(tests, observations) of each observation, with all effects."""
+        variances = np.diagonal(self.blocks, axis1=1, axis2=2)
+        return np.sqrt(variances if self.common is None else variances + (self.common**2).sum(axis=-1))
+
+    @cached_property
     def roots(self) -> Floats:
         """(tests, observations, observations) R of each test, with B = R R'."""
         tests, count = self.series.shape
@@ -162,9 +168,6 @@ def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> t
 def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:
     """Number of independent observations that carry the same information on a common mean as all frames together."""
     factor = CovarianceFactor.of_residuals(residuals, noise_model.without_offsets)
-    variances = np.diagonal(factor.blocks, axis1=1, axis2=2)
-    if factor.common is not None:
-        variances = variances + (factor.common**2).sum(axis=-1)
-    standard_deviations = np.where(residuals.present, np.sqrt(variances), 0.0)
+    standard_deviations = np.where(residuals.present, factor.standard_deviations, 0.0)
     information = float((factor.whiten(standard_deviations) ** 2).sum())
     return float(np.clip(information, len(residuals.values), residuals.present.sum()))

@@ -19,7 +19,7 @@ from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json
 from creepkit.inverse.selection.perturbation_trials import Challenge
-from creepkit.inverse.selection.ranking import Criterion, RankedLaw, Ranking
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking
 from creepkit.limits import numbers
 
 if TYPE_CHECKING:
@@ -54,8 +54,6 @@ class RankingFile:
     """What a ranking's file holds: the laws, the best first, and the other fields of a Ranking."""
 
     laws: tuple[LawFile, ...]
-    criterion: Criterion
-    independent_frames: float
     failed: dict[str, str]
     further: tuple[str, ...]
     challenges: tuple[Challenge, ...] | None
@@ -74,12 +72,7 @@ class RankingFile:
 
 
 UNKNOWN = numbers(0.0, nan=True, infinite=True)
-CODEC = RecordCodec(
-    ranges={
-        LawFile: {"excess": UNKNOWN, "weight": numbers(0.0, 1.0), "chi_square": UNKNOWN},
-        RankingFile: {"independent_frames": UNKNOWN},
-    }
-)
+CODEC = RecordCodec(ranges={LawFile: {"excess": UNKNOWN, "weight": numbers(0.0, 1.0), "chi_square": UNKNOWN}})
 
 
 def stems_of_laws(laws: Iterable[CreepLaw], stem: str) -> list[str]:
@@ -100,9 +93,7 @@ def ranking_to_document(ranking: Ranking, files: Sequence[tuple[str, str]]) -> d
     """The ranking as JSON-able data; files : of each law, that of its identification, beside it, and its SHA-256."""
     pairs = [*zip(files, ranking.laws, strict=True)][:MOST_LAWS]  # those of least weight say nothing
     laws = tuple(LawFile(*file, one.excess, one.weight, one.chi_square, one.same_as) for file, one in pairs)
-    content = RankingFile(
-        laws, ranking.criterion, ranking.independent_frames, dict(ranking.failed), ranking.further, ranking.challenges
-    )
+    content = RankingFile(laws, dict(ranking.failed), ranking.further, ranking.challenges)
     return {**RANKING.heading, **CODEC.to_json(content)}
 
 
@@ -132,7 +123,7 @@ def ranking_from_json(data: Any, source: str) -> Ranking:
     if len({one.fit.provenance.get("data") for one in laws}) > 1:
         raise FitError(f"{path}: its laws were not identified alike from the same tests; {RANKING.kind.advice}")
     failed = MappingProxyType(found.failed)
-    return Ranking(laws, found.criterion, found.independent_frames, failed, found.further, found.challenges)
+    return Ranking(laws, failed, found.further, found.challenges)
 
 
 def _fit_of_law(path: Path, law: LawFile) -> Identification:

@@ -40,6 +40,19 @@ class LinearisedProblem:
         assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
+    def of(self, unknowns: Sequence[int]) -> LinearisedProblem:
+        """The same of some of the unknowns, the others held."""
+        residuals, kept = self.residuals, [*unknowns]
+        assert residuals.jacobian is not None
+        return LinearisedProblem(
+            replace(residuals, jacobian=residuals.jacobian[..., kept]),
+            self.precision[kept],
+            self.prior_residual[kept],
+            self.free[kept],
+            self.step_bounds[:, kept],
+            self.x[kept],
+        )
+
     def with_effects(self, effects: Iterable[Perturbation]) -> LinearisedProblem:
         """The same with perturbations in the covariance: of each test by itself, or of all tests alike."""
         own, common = list[Floats](), list[Floats]()

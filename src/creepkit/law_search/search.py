@@ -20,14 +20,15 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times
+from creepkit.inverse.evidence import DECISIVE_EXCESS
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.initial_search import StartingEstimate, search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
 from creepkit.inverse.search.multistart import refined
+from creepkit.inverse.selection.discrimination import score_under_own_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.selection.select import as_shown
 from creepkit.inverse.settings import IdentificationSettings
@@ -104,7 +105,7 @@ def search_laws(
     ranked = [one for one in best if search.score(one) < search.score(best[0]) + NEAR]
     ranked += [one for one in search.best(REGISTERED_RANKED, search.registered) if one not in ranked]
     notes = (*left_out, *loading_notes(sound), *rig_notes(sound, settings))
-    ranking = _ranked([search.fits[one] for one in ranked], sound, predictor, settings, notes)
+    ranking = _ranked({one: search.fits[one] for one in ranked}, sound, predictor, settings, notes)
     least = min(map(search.score, search.fits))
     tried = tuple(
         SearchedLaw(fit.law, fit.rms, search.score(key) - least, key in search.registered)
@@ -114,25 +115,26 @@ def search_laws(
 
 
 def _ranked(
-    fits: Sequence[Identification],
+    fits: Mapping[Sentence | str, Identification],
     tests: Sequence[History],
     predictor: Any,
     settings: IdentificationSettings,
     notes: Sequence[str],
 ) -> Ranking:
     """The laws identified in full, each from where its quick identification ended, and ranked as by select()."""
-    full = replace(common_rupture_times([fit.law for fit in fits], settings), weights="likelihood")
-    found, failed = list[Identification](), dict[str, str]()
-    for fit in fits:
+    full = replace(common_rupture_times([fit.law for fit in fits.values()], settings), weights="likelihood")
+    found, failed, parts = list[Identification](), dict[str, str](), list[int]()
+    for key, fit in fits.items():
         start = StartingEstimate.from_identification(fit)
         try:
             one = identify(fit.law, tests, predictor, settings=full, start=start)
             found.append(replace(one, notes=(*one.notes, *notes)))
+            parts.append(further_parts(key))
         except CreepkitError as error:
             failed[fit.law.name] = str(error)
     if not found:
         raise FitError(f"no law of the search could be identified in full: {next(iter(failed.values()))}")
-    ranking = rank(found, failed=failed)
+    ranking = rank(found, failed, further_parts=parts)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=as_shown(one.fit, settings, None)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws))
@@ -142,6 +144,11 @@ def _quick(settings: IdentificationSettings, registered: Sequence[CreepLaw]) -> 
     """Those of identifications on the way, alike for laws that can rise to rupture and others."""
     alike = common_rupture_times([*registered, Product(softening="strain").law], settings)
     return replace(alike, starts=2, sobol_points=64, frames=20, weights="likelihood", usual_errors="none")
+
+
+def further_parts(key: Sentence | str) -> int:
+    """How many products and factors a sentence has beside its first; none of a registered law."""
+    return sum(1 + one.factors for one in key.products) - 1 if isinstance(key, Sentence) else 0
 
 
 @dataclass
@@ -156,6 +163,7 @@ class _Search:
     progress: Callable[[str, int, int], None] | None
     screened: dict[Sentence, RateFit] = field(default_factory=dict)
     fits: dict[Sentence | str, Identification] = field(default_factory=dict)
+    scores: dict[Sentence | str, float] = field(default_factory=dict)
     failed: dict[Sentence | str, str] = field(default_factory=dict)
     registered: list[Sentence | str] = field(default_factory=list)
     expanded: set[Sentence] = field(default_factory=set)
@@ -263,8 +271,11 @@ class _Search:
 
     def score(self, key: Sentence | str) -> float:
         """The criterion of a quick identification."""
-        fit = self.fits[key]
-        return -2.0 * fit.log_likelihood + bic_penalty(len(fit.law.params), fit.effective_frames)
+        if key not in self.scores:
+            fit = self.fits[key]
+            self.scores[key] = score_under_own_covariance(fit, fit.linear_problem, fit.effective_frames)
+            self.scores[key] += DECISIVE_EXCESS * further_parts(key)
+        return self.scores[key]
 
     def best(self, count: int, among: Collection[Sentence | str] | None = None) -> list[Any]:
         """The keys of lowest criterion, of sentences or `among` others."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.experiments.planned_design import ALIKE, USEFUL_PROBABILITY, kind_of_reason, precision_text
-from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.records import SECONDS_PER_HOUR, load_unit
 from creepkit.reports.answer import MOST_CAUTIONS
 from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, plural

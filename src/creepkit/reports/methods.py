@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.output_transforms import LogTransform
@@ -39,8 +39,7 @@ CITATIONS = {
     "weighted least squares": "G. A. F. Seber, C. J. Wild (1989), Nonlinear Regression, Wiley, New York",
     "reml": "H. D. Patterson, R. Thompson (1971), Biometrika 58, 545-554",
     "satterthwaite": "F. E. Satterthwaite (1946), Biometrics Bull. 2, 110-114",
-    "bic": "G. Schwarz (1978), Ann. Stat. 6, 461-464",
-    "aicc": "C. M. Hurvich, C.-L. Tsai (1989), Biometrika 76, 297-307",
+    "evidence": "D. J. C. MacKay (1992), Neural Comput. 4, 415-447",
     "larson-miller": "F. R. Larson, J. Miller (1952), Trans. ASME 74, 765",
     "orr-sherby-dorn": "R. L. Orr, O. D. Sherby, J. E. Dorn (1954), Trans. ASM 46, 113",
     "manson-haferd": "S. S. Manson, A. M. Haferd (1953), NACA TN 2890",
@@ -225,28 +224,20 @@ def _sparsity(found: ReportGroup) -> Iterator[str]:
     """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
         dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
-        selected = "were selected by BIC among its subsets"
+        selected = "were selected by the evidence for its subsets"
         yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
 
 
 # ---- comparison and adequacy -----------------------------------------------------------------------------------------
 
 
-CRITERIA = {
-    "bic": ("Bayesian information criterion", "K ln n"),
-    "aicc": ("corrected information criterion of Akaike", "2 K + 2 K (K + 1) / (n - K - 1)"),
-}
-"""{criterion: its name, and its penalty for K parameters and n readings}."""
-
-
 def _comparison(found: ReportGroup, cite: Callable[..., str]) -> Iterator[str]:
     """How the laws of a material were compared."""
     if found.ranking is None:
         return
-    name, penalty = CRITERIA[found.ranking.criterion]
-    yield f"The laws were compared by the {name}{cite(found.ranking.criterion)}: chi-square, plus {penalty}."
+    yield f"The laws were compared by their evidence, by Laplace's method{cite('evidence')}."
     yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
-    yield "K counts the parameters that the tests determine, n the readings that autocorrelation leaves apart."
+    yield "Each parameter costs 2 ln of the factor by which the tests narrow its bounds."
     yield f"The weight of a law is exp(-difference / 2) over the sum of all; it is credible above {CREDIBLE_WEIGHT:g}."
     yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not reject it."
     yield "Nor may a share of another law, or an effect that was not modelled, change that."

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, listed, number, plural
@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import RankedLaw, Ranking
     from creepkit.reports.svg import PageFigures
-
-
-CRITERIA = {"bic": "BIC", "aicc": "AICc"}
 
 
 MOST_BEHIND, SMALLER = 3, 0.95
@@ -87,8 +84,7 @@ def _table(ranking: Ranking) -> Table:
         )
         for one in ranking.laws
     ]
-    behind = f"{CRITERIA[ranking.criterion]} - best"
-    columns = ("law", "parameters", "mean misfit", "test to test", behind, "weight", "chi-square", "by the noise")
+    columns = ("law", "parameters", "mean misfit", "test to test", "behind", "weight", "chi-square", "by the noise")
     return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
 
 
@@ -104,7 +100,7 @@ def _behind(ranking: Ranking) -> list[str]:
         if not math.isfinite(one.excess):
             kind = "left out" if one.fit.law.name in ranking.further else "unpredicted"
         if smaller and not one.same_as and (kind != "readings" or math.isfinite(more)):
-            values = {"law": one.fit.law.name, "what": listed(smaller), "criterion": CRITERIA[ranking.criterion]}
+            values = {"law": one.fit.law.name, "what": listed(smaller)}
             found.append(COMPARED[kind].format(**values, more=number(more, 2), excess=number(one.excess, 2)))
     return found[:MOST_BEHIND]
 
@@ -140,7 +136,7 @@ def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]
             name: getattr(ranking, name)
             for name in ("verdict", "decisive", "adequacy", "further", "failed", "challenges")
         },
-        "laws": [{**_fit_to_json(one.fit), "bic_excess": one.excess, "weight": one.weight} for one in ranking.laws],
+        "laws": [{**_fit_to_json(one.fit), "excess": one.excess, "weight": one.weight} for one in ranking.laws],
         "files": [str(path) for path in written],
     }
 

@@ -255,7 +255,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     if not np.isfinite([measured, predicted]).all():
         return ""
     over = ends([one.stress for one in rates], 3)
-    return f"stress exponent over {over} MPa: {measured:.2g} measured, {predicted:.2g} by the law"
+    return f"exponent, {over} MPa: {measured:.2g} measured, {predicted:.2g} by the law"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------

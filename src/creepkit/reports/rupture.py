@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
 from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of

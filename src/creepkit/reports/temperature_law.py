@@ -119,7 +119,7 @@ def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: 
 MAX_COMBINATIONS_LISTED = 6
 
 
-CRITERION = {"points": "the quasi AICc of the estimates", "histories": "the BIC of the tests"}
+CRITERION = {"points": "the quasi AICc of the estimates", "histories": "the evidence of the tests"}
 
 
 EQUIVALENCE_NOTE = {

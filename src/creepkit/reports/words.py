@@ -141,7 +141,7 @@ COMPARED = {
     # a law with a smaller misfit than the best, and why it is behind
     "readings": "{law} has the smaller misfit of {what}, but its chi-square over all readings is {more} higher",
     # its chi-square is not higher
-    "parameters": "{law} has the smaller misfit of {what}, but its parameters cost more ({criterion} {excess} higher)",
+    "parameters": "{law} has the smaller misfit of {what}, but its parameters cost more ({excess} behind)",
     # nobody asked for it
     "left out": "{law} has the smaller misfit of {what}, but nobody asked for it, and it predicts left-out tests worse",
     # it gives no number for some readings

@@ -13,7 +13,7 @@ import numpy as np
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, refuse_unknown
-from creepkit.inverse.information_criteria import bic_penalty, criterion_weights
+from creepkit.inverse.evidence import evidence_weights
 from creepkit.records import History
 from creepkit.records.units import celsius_text
 from creepkit.rupture_assessment.assessment import (
@@ -202,8 +202,8 @@ def _ranked(
                 fits.append(fit)
     if not fits:
         return (), rejected
-    scores = [-2.0 * fit.log_likelihood + bic_penalty(fit.parameter_count, fit.observations) for fit in fits]
-    excess, by_fit = criterion_weights(scores)
+    scores = [-2.0 * fit.log_likelihood + fit.parameter_count * np.log(fit.observations) for fit in fits]
+    excess, by_fit = evidence_weights(scores)
     degrees = Counter(fit.method for fit in fits)
     shares = by_fit / [degrees[fit.method] for fit in fits]  # every method has the same weight before the tests
     weight = shares / shares.sum()

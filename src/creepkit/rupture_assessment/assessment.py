@@ -19,7 +19,7 @@ from creepkit.files.json_documents import DocumentFormat, check_heading, write_j
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import write_text
-from creepkit.inverse.information_criteria import DECISIVE_WEIGHT
+from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.limits import ANY_NUMBER, PROBABILITY, SEED, Limits, numbers
 from creepkit.options import CELSIUS, Options, option
 from creepkit.records import SECONDS_PER_HOUR

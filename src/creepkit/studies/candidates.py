@@ -38,16 +38,7 @@ def ranked_candidates(
     from creepkit.inverse.compared_tests import common_rupture_times
 
     if by_likelihood(asked, settings) and (len(laws) > 1 or compared):
-        return ck.select(
-            laws,
-            tests,
-            using,
-            sums=asked.sums,
-            criterion=asked.criterion,
-            settings=settings,
-            progress=progress,
-            **options,
-        )
+        return ck.select(laws, tests, using, sums=asked.sums, settings=settings, progress=progress, **options)
     options |= {"settings": common_rupture_times(laws, settings), "penalty": asked.penalty}
     fits = []
     for k, law in enumerate(laws, start=1):

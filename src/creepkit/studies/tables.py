@@ -226,7 +226,7 @@ class SpecimenTable(TableModel):
     lengths: dict[Text, Positive] = {}
 
 
-ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums", "criterion")
+ELSEWHERE = ("nuisances", "seed", "suspect_frames", "further_laws", "bounds", "sums")
 """Options of identifications whose keys stand in tables of their own, in [study], [data] and [selection]."""
 
 

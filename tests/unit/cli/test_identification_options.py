@@ -83,7 +83,7 @@ def test_options_for_measured_tests_are_refused_with_identifications() -> None:
 
 def test_what_has_no_effect_with_or_without_a_plate_is_refused() -> None:
     alone = (["--dense", "none"], ["--workers", "1"], ["--compositions", "c.csv"])
-    of_plate = (["--sums"], ["--penalty", "l2"], ["--criterion", "aicc"], ["--further-tests"])
+    of_plate = (["--sums"], ["--penalty", "l2"], ["--further-tests"])
     cases = [(words, f"{words[0]} is for a plate: add --by alloy, or leave it out") for words in alone]
     cases += [(["--by=alloy", *words], f"{words[0]} is not for a plate, ") for words in of_plate]
     cases += [(["--budget-s", "5"], "--budget-s is for a search of laws: add --search")]

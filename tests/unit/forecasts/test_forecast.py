@@ -387,7 +387,7 @@ def saved_fit():
 
 def test_a_ranking_saves_its_laws_beside_itself(saved_fit, tmp_path):
     other = replace(saved_fit, law=replace(saved_fit.law, name="ranking"))  # a law of the name of the file itself
-    ranking = ranking_from_scores([saved_fit, other], np.array([0.0, 2.0]), "bic", independent_frames=60.0)
+    ranking = ranking_from_scores([saved_fit, other], np.array([0.0, 2.0]))
     path = ranking.save(tmp_path / "ranking.json")
     assert path == tmp_path / "ranking.json"
     found = ck.load(path)

@@ -101,7 +101,6 @@ MISTAKES = [
     (lambda tests, fit: History("bar", *BAR, rupture_time=9.0), "a used frame at 10 s lies after the rupture at 9 s"),
     (lambda tests, fit: History("bar", *BAR, rupture_time=10.0, unruptured=True), "keep one of them"),
     (lambda tests, fit: rank([]), "there are no identifications to rank"),
-    (lambda tests, fit: rank([fit], "hold-up"), "criterion of rank() is 'hold-up'; allowed is 'bic' or 'aicc'"),
     (lambda tests, fit: rank([fit, replace(fit, provenance={"data": "others"})]), "were made from different histories"),
     (lambda tests, fit: ck.select([], tests, "uniaxial"), "there are no candidate laws"),
     (lambda tests, fit: correlation(fit, "raw"), "is 'raw'; allowed is 'author' or 'conditioned'"),

@@ -196,7 +196,7 @@ def fits():
 
 
 def ranked(fits, *scores):
-    return ranking_from_scores(fits, np.array(scores), "bic", independent_frames=50.0)
+    return ranking_from_scores(fits, np.array(scores))
 
 
 def test_of_two_laws_that_cannot_be_told_apart_both_are_drawn_and_named(fits, tmp_path):

@@ -28,8 +28,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
+from creepkit.inverse.evidence import DECISIVE_EXCESS, occam_penalty
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.perturbation import Perturbation
@@ -44,16 +44,14 @@ from creepkit.language import CreepLaw, strain, time
 class CommonCovarianceFits:
     """Laws under one covariance.
 
-    chi_square : (laws,) - with priors; log_determinant : (laws,) - of the nuisance parameters that are integrated out,
-    and of the covariance.
-    independent_frames : number of independent frames; reference_law : position of the law whose covariance it is.
+    chi_square : (laws,) - with priors. scores : (laws,) -2 ln of their evidence.
+    reference_law : position of the law whose covariance it is.
     whitened : (laws, observations) - whitened residuals, zero where there are no data.
     steps : of each law (unknowns,), from its values to its optimum.
     """
 
     chi_square: Floats
-    log_determinant: Floats
-    independent_frames: float
+    scores: Floats
     reference_law: int
     whitened: Floats
     steps: tuple[Floats, ...]
@@ -75,7 +73,7 @@ def under_common_covariance(
     if errors:
         problems = [linear.with_effects(own) for linear, own in zip(plain, errors, strict=True)]
     frames = max(effective_sample_size(one.residuals, fit.noise_model) for fit, one in zip(fits, plain, strict=True))
-    own_scores = [_score_under_own_covariance(fit, one, frames) for fit, one in zip(fits, problems, strict=True)]
+    own_scores = [score_under_own_covariance(fit, one, frames) for fit, one in zip(fits, problems, strict=True)]
     reference_law = int(np.argmin(own_scores))
     noise_model, reference_residuals = fits[reference_law].noise_model, plain[reference_law].residuals
     factors = [
@@ -85,17 +83,8 @@ def under_common_covariance(
     results = [
         _optimum_under(linear, factor, len(fit.u)) for linear, factor, fit in zip(problems, factors, fits, strict=True)
     ]
-    chi_squares, log_determinants, whitened, steps = zip(*results, strict=True)
-    stopped = [linear.residuals.stopped for linear in problems]
-    return CommonCovarianceFits(
-        np.add(chi_squares, [one.chi_square for one in stopped]),
-        np.add(log_determinants, [factor.log_determinant for factor in factors])
-        + [one.log_variance for one in stopped],
-        effective_sample_size(reference_residuals, noise_model),
-        reference_law,
-        np.array(whitened),
-        steps,
-    )
+    chi_squares, scores, whitened, steps = zip(*results, strict=True)
+    return CommonCovarianceFits(np.array(chi_squares), np.array(scores), reference_law, np.array(whitened), steps)
 
 
 def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
@@ -110,22 +99,20 @@ def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     return replace(residuals, offset_sensitivity=offset_sensitivity, log_rate_sensitivity=rate_effect)
 
 
-def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem, frames: float) -> float:
-    """-2 ln L with the law's own scatter, and the penalty of BIC on its parameters and variance components.
+def score_under_own_covariance(fit: Identification, linearised: LinearisedProblem, frames: float) -> float:
+    """-2 ln of the evidence with the law's own scatter, whose variance components are penalised by `frames`.
 
     A law that needs a drift for what another follows must not set the covariance.
     """
     factor = CovarianceFactor.of_residuals(linearised.residuals, fit.noise_model)
-    parameter_count = len(fit.u) + len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
-    chi_square, *_ = _optimum_under(linearised, factor, len(fit.u))
-    chi_square -= 2.0 * linearised.residuals.stopped.log_likelihood
-    return factor.log_determinant + chi_square + bic_penalty(parameter_count, frames)
+    components = len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
+    return _optimum_under(linearised, factor, len(fit.u))[1] + components * float(np.log(frames))
 
 
 def _optimum_under(
     linearised: LinearisedProblem, factor: CovarianceFactor, parameter_count: int
 ) -> tuple[float, float, Floats, Floats]:
-    """Chi-square with priors at the optimum within the bounds, log determinant of nuisances, whitened residuals, step.
+    """Chi-square with priors at the optimum within the bounds, -2 ln of the evidence, whitened residuals, step.
 
     Only nuisance parameters have priors here: the weak ones of a law's parameters must not favour the middle of bounds.
     """
@@ -135,7 +122,10 @@ def _optimum_under(
     step = np.zeros(precision.size)
     step[linearised.free] = without_parameter_priors.step_within(factor)
     chi_square, whitened = _chi_square(without_parameter_priors, factor, step)
-    return chi_square, _nuisance_log_determinant(linearised, factor, parameter_count), whitened, step
+    stopped = linearised.residuals.stopped
+    score = chi_square + stopped.log_variance + stopped.chi_square + factor.log_determinant
+    score += occam_penalty(linearised, factor)
+    return chi_square + stopped.chi_square, score, whitened, step
 
 
 def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:
@@ -145,19 +135,6 @@ def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: F
     prior_deviation = linearised.prior_residual + step
     total = (whitened**2).sum() + (linearised.precision * prior_deviation**2).sum()
     return float(total), np.where(residuals.present, whitened, 0.0).ravel()
-
-
-def _nuisance_log_determinant(linearised: LinearisedProblem, factor: CovarianceFactor, parameter_count: int) -> float:
-    """ln det(1 + S J'C^-1 J S) of the nuisance parameters, S their prior standard deviations."""
-    assert linearised.residuals.jacobian is not None
-    jacobian = linearised.residuals.jacobian[..., parameter_count:]
-    if not jacobian.shape[-1]:
-        return 0.0
-    sd = 1.0 / np.sqrt(np.maximum(linearised.precision[parameter_count:], 1e-300))
-    sd = np.minimum(sd, np.diff(linearised.step_bounds, axis=0)[0, parameter_count:] / np.sqrt(12.0))
-    whitened = factor.whiten(jacobian * sd)
-    information = np.einsum("tep,teq->pq", whitened, whitened)
-    return float(np.linalg.slogdet(information + np.eye(len(sd)))[1])
 
 
 SAME_FUNCTION = 0.05
@@ -200,10 +177,6 @@ class RatesOverTests:
         return stands
 
 
-DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
-"""Chi-square between predictions from which on a test can be expected to decide."""
-
-
 STRESS_POINTS = 21
 """Stresses at which local exponents are compared."""
 
@@ -235,7 +208,7 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
     for a, b in combinations(range(len(fits)), 2):
         chi_square = float(((whitened[a] - whitened[b]) ** 2).sum())
         richer_law, reduction = _reduction_between(fits[a], fits[b])
-        if chi_square < DISTINGUISHABLE_CHI_SQUARE or reduction:
+        if chi_square < DECISIVE_EXCESS or reduction:
             sentence = _equivalence_sentence(fits[a], fits[b], chi_square, richer_law, reduction)
             pairs.append(EquivalentLaws(fits[a].law.name, fits[b].law.name, chi_square, reduction, sentence))
     return tuple(sorted(pairs, key=lambda pair: pair.chi_square))

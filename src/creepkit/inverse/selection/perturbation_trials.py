@@ -19,14 +19,13 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_EXCESS, DECISIVE_WEIGHT, evidence_weights
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT, bic_penalty, criterion_weights
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.selection.discrimination import (
-    DISTINGUISHABLE_CHI_SQUARE,
     CommonCovarianceFits,
     RatesOverTests,
     under_common_covariance,
@@ -64,7 +63,7 @@ Scope = Literal["test", "all"]
 class Trial:
     """The laws with one perturbation. scope : whether it is independent in each test, or one of all tests.
 
-    effects : it, by each law. scores : (laws,) -2 ln of the evidence by BIC. u : of each law (parameters,) coordinates
+    effects : it, by each law. scores : (laws,) -2 ln of the evidence. u : of each law (parameters,) coordinates
     where it fits best. noise_model : of the common covariance.
     """
 
@@ -77,9 +76,9 @@ class Trial:
     @classmethod
     def of(cls, fits: Sequence[Identification], effects: tuple[Perturbation, ...], scope: Scope) -> Trial:
         """That of some identifications by likelihood; effects : of each, the perturbation by its law."""
-        scores, common = _scores(fits, [replace(effect, common=scope == "all") for effect in effects])
+        common = _under_errors(fits, [replace(effect, common=scope == "all") for effect in effects])
         u = tuple(fit.u + step[: fit.u.size] for fit, step in zip(fits, common.steps, strict=True))
-        return cls(scope, effects, scores, u, fits[common.reference_law].noise_model)
+        return cls(scope, effects, common.scores, u, fits[common.reference_law].noise_model)
 
     @property
     def is_of_length(self) -> bool:
@@ -108,17 +107,15 @@ class Trial:
         return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
 
 
-def _scores(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> tuple[Floats, CommonCovarianceFits]:
-    """(laws,) -2 ln of the evidence by BIC of identifications, and the fits under one covariance that it is of.
+def _under_errors(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> CommonCovarianceFits:
+    """Identifications under one covariance with the usual errors of tests.
 
     tried : a perturbation by each law, beside the usual errors of tests, and in the place of one of its kind.
     """
     errors = [usual_errors(fit) for fit in fits]
     if tried:
         errors = [[*(e for e in own if e.kind != new.kind), new] for own, new in zip(errors, tried, strict=True)]
-    common = under_common_covariance(fits, errors)
-    penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
-    return common.chi_square + common.log_determinant + penalties, common
+    return under_common_covariance(fits, errors)
 
 
 def _trials(fits: Sequence[Identification]) -> Iterator[Trial]:
@@ -141,7 +138,7 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     challenges: dict[str, tuple[float, Challenge]] = {}
     rates = RatesOverTests(fits)
     for trial in _trials(fits):
-        own = criterion_weights(trial.scores)[1]
+        own = evidence_weights(trial.scores)[1]
         weights = np.bincount(rates.standing(trial.u, trial.scores), own, len(fits))
         effect, weight = trial.effects[0], float(weights[0])
         if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
@@ -170,13 +167,13 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     if not trials:
         return ()
     rejected = fits[0].adequacy is not None and fits[0].adequacy.rejects
-    as_stated, _ = _scores(fits)
+    as_stated = _under_errors(fits).scores
     raised = [
         (float(trial.scores[law]), law, trial)
         for trial in trials
         for law, fit in enumerate(fits)
-        if trial.scores[law] < as_stated[law] - DISTINGUISHABLE_CHI_SQUARE
-        and trial.scores[law] < as_stated.min() + DISTINGUISHABLE_CHI_SQUARE
+        if trial.scores[law] < as_stated[law] - DECISIVE_EXCESS
+        and trial.scores[law] < as_stated.min() + DECISIVE_EXCESS
         and (rejected or not weights[law] > CREDIBLE_WEIGHT)
         and not any(trial.scores[k] < trial.scores[law] and len(f.u) <= len(fit.u) for k, f in enumerate(fits))
         and _explains_with(fit, trial.effects[law])
@@ -189,7 +186,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
         return ()
     by_kind = {best.effects[0].kind: best}
     for other_score, law, trial in sorted(raised, key=lambda one: one[0]):
-        if law == laws[0] and other_score < score + DISTINGUISHABLE_CHI_SQUARE:
+        if law == laws[0] and other_score < score + DECISIVE_EXCESS:
             by_kind.setdefault(trial.effects[0].kind, trial)
     texts = [trial.description(fits, laws[0]) for trial in by_kind.values()]
     names = " or ".join(fits[law].law.name for law in laws[:MOST_NAMED])

@@ -7,8 +7,8 @@ share of another law explains the tests better, no threshold as well, and no unm
 (see selection.challenges). What share of another law the tests allow is said beside it.
 
 Laws are compared under a common covariance (see selection.discrimination), where each fits best under it whatever
-weights its values were found with: chi-square + K ln n (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent
-frames and nuisance parameters and usual errors of tests integrated out. Weights are exp(-excess / 2) over their sum.
+weights its values were found with, by their evidence (see inverse.evidence), with nuisance parameters and usual errors
+of tests integrated out. Weights are exp(-excess / 2) over their sum.
 """
 
 from __future__ import annotations
@@ -17,22 +17,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
+from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_EXCESS, DECISIVE_WEIGHT, evidence_weights
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import (
-    CREDIBLE_WEIGHT,
-    DECISIVE_WEIGHT,
-    aicc_penalty,
-    bic_penalty,
-    criterion_weights,
-    determined_parameters,
-)
 from creepkit.inverse.selection.discrimination import RatesOverTests, under_common_covariance, usual_errors
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
@@ -44,12 +37,9 @@ if TYPE_CHECKING:
     from creepkit.records import History, LawWithValues
 
 
-Criterion = Literal["bic", "aicc"]
-
-
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, weight, and chi-square under the covariance of the best.
+    """One law in a ranking: excess of -2 ln of its evidence, weight, and chi-square under the covariance of the best.
 
     same_as : name of the simpler law that is the same function over the tests, which has its weight; "" of most.
     """
@@ -65,14 +55,12 @@ class RankedLaw:
 class Ranking(Presentable, Plotted, Tabulated):
     """Identified laws, best first.
 
-    criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
+    failed : {law: why it could not be identified}.
     further : names of laws that were tried because none of those asked for explains the tests.
     challenges : what the tests allow beside the best law; None where that was not examined, as for laws from files.
     """
 
     laws: tuple[RankedLaw, ...]
-    criterion: Criterion = "bic"
-    independent_frames: float = float("nan")
     failed: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     further: tuple[str, ...] = ()
     challenges: tuple[Challenge, ...] | None = None
@@ -82,7 +70,7 @@ class Ranking(Presentable, Plotted, Tabulated):
 
     @property
     def best(self) -> Identification:
-        """The law of lowest criterion."""
+        """The law of most evidence."""
         return self.laws[0].fit
 
     @property
@@ -243,16 +231,18 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
 @checked
 def rank(
     fits: Sequence[Identification],
-    criterion: Criterion = "bic",
     failed: Mapping[str, str] | None = None,
     *,
     further: Collection[str] = (),
+    further_parts: Sequence[int] = (),
     challenge: bool = True,
 ) -> Ranking:
-    """Rank identifications made from the same histories, with weights and a verdict; criterion : "bic" or "aicc".
+    """Rank identifications made from the same histories, with weights and a verdict.
 
     further : names of laws that nobody asked for. One that the tests contradict, too, comes last where it predicts
         tests worse, each left out, than a law that was asked for: it only bends further to the curves at hand.
+    further_parts : of each law, how many terms and factors a search gave it: before the tests the odds are 19 to 1
+        against each, for the evidence is indifferent to one that changes nothing.
     challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
         is decisive.
     """
@@ -264,14 +254,11 @@ def rank(
             "cannot be ranked; make them alike (rupture_times='use' or 'ignore' for all laws)"
         )
     common = under_common_covariance(fits, [usual_errors(fit) for fit in fits])
-    independent_frames, chi_square = common.independent_frames, common.chi_square
-    penalty = bic_penalty if criterion == "bic" else aicc_penalty
-    counts = [determined_parameters(fit.linear_problem.residuals, fit.u.size) for fit in fits]
-    score = chi_square + common.log_determinant + [penalty(count, independent_frames) for count in counts]
-    score = np.where(_are_outdone(fits, further), np.inf, score)
+    score = np.where(_are_outdone(fits, further), np.inf, common.scores)
+    score += DECISIVE_EXCESS * np.array(further_parts or [0] * len(fits))
     ranking = ranking_from_scores(
-        fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed,
-        rates=RatesOverTests(fits),
+        fits, score, chi_square=common.chi_square,
+        failed=failed, rates=RatesOverTests(fits),
     )  # fmt: skip
     return challenged(ranking) if challenge else ranking
 
@@ -296,7 +283,7 @@ def challenged(ranking: Ranking) -> Ranking:
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    _, weights = criterion_weights([ranked.excess for ranked in ranking.laws])
+    _, weights = evidence_weights([ranked.excess for ranked in ranking.laws])
     found = challenges_of(fits) if ranking.singled_out else explaining_effects(fits, weights)
     return replace(ranking, challenges=found)
 
@@ -304,9 +291,7 @@ def challenged(ranking: Ranking) -> Ranking:
 def ranking_from_scores(
     fits: Sequence[Identification],
     scores: Floats,
-    criterion: Criterion,
     *,
-    independent_frames: float,
     chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
     rates: RatesOverTests | None = None,
@@ -318,11 +303,11 @@ def ranking_from_scores(
     """
     predicted = np.isfinite(scores) & [fit.adequacy is None or not fit.adequacy.unpredicted for fit in fits]
     scores = np.where(predicted, scores, np.inf) if predicted.any() else scores
-    excess, weight = criterion_weights(scores)
+    excess, weight = evidence_weights(scores)
     standing = [*range(len(fits))] if rates is None else rates.standing([fit.u for fit in fits], scores)
     weight = np.bincount(standing, weight, len(fits)).astype(float)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     names = [fits[law].law.name if law != k else "" for k, law in enumerate(standing)]
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k]), names[k]) for k in order)
-    return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))
+    return Ranking(laws, MappingProxyType(dict(failed or {})))

@@ -21,7 +21,7 @@ from creepkit.inverse.identify import describing, identify, sampled_where_needed
 from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.selection.ranking import Criterion, Ranking, rank
+from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.language.algebra import fixed_values
@@ -52,14 +52,12 @@ def select(
     settings: IdentificationSettings | None = None,
     through: Predictor | None = None,
     sums: bool | None = None,
-    criterion: Criterion = "bic",
     progress: IterationCallback | None = None,
 ) -> Ranking:
     """Identify every candidate from the same histories by likelihood, and rank them; see identify.describing.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
         tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
-    criterion : "bic" or "aicc".
     A law that cannot be identified is named in `failed`; FitError if none can. The search of a best law that did not
     converge is repeated.
     """
@@ -85,11 +83,11 @@ def select(
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
-    ranking = rank(fits, criterion, failed, further=tried_further)
+    ranking = rank(fits, failed, further=tried_further)
     if not ranking.best.converged:
         best = _repeated(ranking.best, using, settings, through)
         fits = [best if fit is ranking.best else fit for fit in fits]
-        ranking = rank(fits, criterion, failed, further=tried_further)
+        ranking = rank(fits, failed, further=tried_further)
     shown = {id(one) for one in (ranking.laws[0], *ranking.credible)}
     laws = [replace(one, fit=as_shown(one.fit, asked, through)) if id(one) in shown else one for one in ranking.laws]
     return replace(ranking, laws=tuple(laws), further=tried_further)

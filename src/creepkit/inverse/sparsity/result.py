@@ -15,13 +15,14 @@ from creepkit.records.presentable import Presentable
 class FitStatistics:
     """How well a law fits, on the covariance of the whole sum.
 
-    chi_square : of all outputs, priors included; parameters : of the law that were fitted; bic : chi-square + K ln N.
+    chi_square : of all outputs, priors included; parameters : of the law that were fitted; score : -2 ln of its
+    evidence and of its odds before the tests, but for a constant.
     errors : {output: Errors} over all used frames.
     """
 
     chi_square: float
     parameters: int
-    bic: float
+    score: float
     errors: Mapping[str, OutputErrors] = field(default_factory=dict)
 
 
@@ -30,10 +31,10 @@ class Sparsity(Presentable):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : "l2" or "subsets". kept_terms, dropped_terms : of the sum.
-    exponents_off : exponents switched off, where BIC did not rise by it.
+    exponents_off : exponents switched off, without which there is no less evidence.
     contributions, contributions_after_refit : {term: contribution} of the whole sum, and of what was kept.
     full, reduced : statistics of the sum and of the reduced law under one covariance.
-    observations : measured values, N of BIC.
+    observations : measured values.
     """
 
     law: str
@@ -67,9 +68,9 @@ class Sparsity(Presentable):
         )
 
     @property
-    def bic_difference(self) -> float:
-        """BIC of the reduced law less that of the whole sum; below zero where the reduced law is preferred."""
-        return self.reduced.bic - self.full.bic
+    def score_difference(self) -> float:
+        """-2 ln of the evidence for the reduced law over that for the whole sum; below zero where it has more."""
+        return self.reduced.score - self.full.score
 
     @property
     def verdict(self) -> str:
@@ -79,7 +80,7 @@ class Sparsity(Presentable):
             return f"all terms of '{self.law}' are kept"
         cost = (
             f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer "
-            f"(p = {self.p_value:.2g}) and BIC changes by {self.bic_difference:+.1f}"
+            f"(p = {self.p_value:.2g}) and -2 ln of the evidence changes by {self.score_difference:+.1f}"
         )
         verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
         return f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"

@@ -1,14 +1,13 @@
-"""Term selection: which terms of a sum the tests need, by BIC among its subsets or by the L2 norm of contributions.
+"""Term selection: which terms of a sum the tests need, by evidence for its subsets or the L2 norm of contributions.
 
-"subsets" fits the sets of terms and keeps the one of lowest BIC. "l2" is the sparsity of the paper: L2_STRENGTH times
-the sum of c_i^2 is added to half the chi-square, with c_i the contribution of term i; terms that contribute less than
-LEAST_CONTRIBUTION at the minimum are dropped, and come back, the largest first, until BIC is not above that of the
-sum. As contributions add up to about one, their squares are least at equal shares: it makes the values of a sum
-determinate, and draws a term that the data leave free to the size of the others.
+"subsets" fits the sets of terms and keeps the one of most evidence (see inverse.evidence), where before the tests the
+odds are 19 to 1 against each further term, and against an exponent that can be off. "l2" is the sparsity of the paper:
+L2_STRENGTH times the sum of c_i^2 is added to half the chi-square, with c_i the contribution of term i; terms that
+contribute less than LEAST_CONTRIBUTION at the minimum are dropped, and come back, the largest first, until there is no
+less evidence, with these odds, than for the sum. As contributions add up to about one, their squares are least at equal
+shares: it makes the values of a sum determinate, and draws a term that the data leave free to the size of the others.
 
-All laws are compared under the covariance of the whole sum, so that chi-squares can be subtracted. That covariance
-contains the correlation between frames; each frame then counts as one in BIC. Exponents that can be off are switched
-off where BIC does not rise by it.
+All laws are compared under the covariance of the whole sum, so that chi-squares can be subtracted.
 
 How much a term matters is its contribution over the stresses, strains and times of the tests,
 
@@ -21,7 +20,7 @@ coefficient A_i alone does not show this: its unit depends on the exponents, and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -34,10 +33,10 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.evidence import DECISIVE_EXCESS, occam_penalty
 from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.information_criteria import bic_penalty, determined_parameters
 from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.observation_vector import selected_frames
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -92,7 +91,7 @@ def identify_sparse(
     full = identify(law, histories, using, through=through, **how)  # type: ignore[arg-type]
     problem, screening = full.least_squares_problem, through_for_law(through, law)
     terms = TermSets(problem if screening is None else problem.with_predictor(screening), full.x)
-    chosen = terms.lowest_bic() if penalty == "subsets" else terms.of_least_norm()
+    chosen = terms.of_most_evidence() if penalty == "subsets" else terms.of_least_norm()
     u, e = np.split(chosen.minimum.x, [chosen.problem.parameter_count])
     nuisances = [replace(n, value=float(value)) for n, value in zip(full.nuisances, e, strict=True)]
     start = StartingEstimate(u, nuisances, full.reference)
@@ -130,18 +129,20 @@ class FittedTerms:
         return tuple(self.problem.law.terms)
 
     @cached_property
-    def parameter_count(self) -> int:
-        """Number of parameters of the law that change anything that was measured."""
-        return determined_parameters(self.problem.residuals(self.minimum.x), self.problem.parameter_count)
+    def score(self) -> float:
+        """-2 ln of the evidence and of the odds before the tests, but for a constant."""
+        law = self.problem.law
+        against = DECISIVE_EXCESS * (len(law.terms) + len(switchable_exponents(law)))
+        return 2.0 * self.minimum.cost + self.penalty(range(self.problem.parameter_count)) + against
 
-    @property
-    def bic(self) -> float:
-        """BIC; its deviance is the chi-square, priors included."""
-        return 2.0 * self.minimum.cost + bic_penalty(self.parameter_count, self.problem.observations.count)
+    def penalty(self, parameters: Iterable[int]) -> float:
+        """What some of the law's parameters cost, by their positions, beside nuisance parameters."""
+        kept = [*parameters, *range(self.problem.parameter_count, self.minimum.x.size)]
+        return occam_penalty(self.problem.linearised(self.minimum.x).of(kept), self.problem.covariance_factor)
 
     def statistics(self, fit: Identification) -> FitStatistics:
         """Its statistics; errors are those of an identification of it."""
-        return FitStatistics(2.0 * self.minimum.cost, self.parameter_count, self.bic, fit.errors)
+        return FitStatistics(2.0 * self.minimum.cost, self.problem.parameter_count, self.score, fit.errors)
 
     def without(self, exponent: str, off: float) -> FittedTerms:
         """The same with an exponent off, fitted from here."""
@@ -157,14 +158,14 @@ class TermSets:
         self._fitted: dict[TermNames, FittedTerms] = {}
 
     def fitted(self, terms: TermNames) -> FittedTerms:
-        """The law of these terms, with as many exponents off as BIC allows, one after the other."""
+        """The law of these terms, with as many exponents off as the evidence allows, one after the other."""
         if terms not in self._fitted:
             best = self._best_of(terms, [self.fitted((label,)) for label in terms] if len(terms) > 1 else [])
             while True:
                 law = best.problem.law
                 simpler = [best.without(law.names[k], off) for k, off in switchable_exponents(law)]
-                lowest = min(simpler, key=lambda one: one.bic, default=best)
-                if lowest is best or lowest.bic > best.bic:
+                lowest = min(simpler, key=lambda one: one.score, default=best)
+                if lowest is best or lowest.score > best.score:
                     break
                 best = lowest
             self._fitted[terms] = best
@@ -174,23 +175,24 @@ class TermSets:
         """The whole sum with all its exponents; it starts from a reduced law too, above which it must not end."""
         return self._best_of(self.terms, [reduced])
 
-    def lowest_bic(self) -> FittedTerms:
-        """The set of terms of lowest BIC, without those that cannot have it: no part fits better than the sum."""
-        best = min((self.fitted((label,)) for label in self.terms), key=lambda one: one.bic)
-        least = 2.0 * self.whole(best).minimum.cost
+    def of_most_evidence(self) -> FittedTerms:
+        """The set of terms of most evidence, without those that cannot have it: no part fits better than the sum."""
+        best = min((self.fitted((label,)) for label in self.terms), key=lambda one: one.score)
+        whole = self.whole(best)
+        least = 2.0 * whole.minimum.cost
         while True:
             larger = [(*best.kept_terms, label) for label in self.terms if label not in best.kept_terms]
             if len(self.terms) <= EXHAUSTIVE_LIMIT:
                 larger = [names for k in range(2, len(self.terms) + 1) for names in combinations(self.terms, k)]
             ordered = [tuple(label for label in self.terms if label in names) for names in larger]
-            fitted = [self.fitted(names) for names in ordered if least + self._penalty(names) < best.bic]
-            lowest = min(fitted, key=lambda one: one.bic, default=best)
-            if lowest.bic >= best.bic:
+            fitted = [self.fitted(names) for names in ordered if least + self._penalty(whole, names) < best.score]
+            lowest = min(fitted, key=lambda one: one.score, default=best)
+            if lowest.score >= best.score:
                 return best
             best = lowest
 
     def of_least_norm(self) -> FittedTerms:
-        """The terms that L2 leaves; those come back, the largest first, without which BIC is above that of the sum."""
+        """The terms that L2 leaves; the largest others come back until there is no less evidence than for the sum."""
         single = [self.fitted((label,)) for label in self.terms]
         of_terms = TermContributions.of_problem(self.problem)
         norm = contribution_norm(of_terms)
@@ -201,14 +203,16 @@ class TermSets:
         count = max(sum(share >= LEAST_CONTRIBUTION for share in contributions.values()), 1)
         while True:
             kept = self.fitted(tuple(label for label in self.terms if label in ordered[:count]))
-            if count == len(self.terms) or kept.bic <= self.whole(kept).bic:
+            if count == len(self.terms) or kept.score <= self.whole(kept).score:
                 return kept
             count += 1
 
-    def _penalty(self, terms: TermNames) -> float:
-        """Of BIC, on these terms with all exponents off."""
-        law = self.problem.law.only(*terms)
-        return bic_penalty(len(law.params) - len(switchable_exponents(law)), self.problem.observations.count)
+    def _penalty(self, whole: FittedTerms, terms: TermNames) -> float:
+        """What these terms cost with all exponents off, by what the whole sum says of their parameters."""
+        law, names = self.problem.law.only(*terms), whole.problem.law.names
+        off = {k for k, _ in switchable_exponents(law)}
+        kept = whole.penalty(names.index(name) for k, name in enumerate(law.names) if k not in off)
+        return kept + DECISIVE_EXCESS * len(terms)
 
     def _best_of(self, terms: TermNames, parts: Sequence[FittedTerms]) -> FittedTerms:
         """The lowest minimum of these terms: from what the whole sum says of them, and from laws of some of them.

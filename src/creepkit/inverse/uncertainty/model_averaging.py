@@ -14,8 +14,8 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
+from creepkit.inverse.evidence import evidence_weights
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.information_criteria import criterion_weights
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
 from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, MixtureDistribution
 from creepkit.inverse.uncertainty.quantities import (
@@ -62,7 +62,7 @@ class ModelAverage(RateStatements, Presentable):
         """
         if isinstance(source, Identification):
             return cls((source,), (1.0,))
-        weights = criterion_weights([r.excess for r in source.laws])[1]
+        weights = evidence_weights([r.excess for r in source.laws])[1]
         weighted = [(r.fit, float(weight)) for r, weight in zip(source.laws, weights, strict=True) if weight > 0]
         return cls(*zip(*weighted, strict=True))
 

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import creepkit as ck
+from creepkit.inverse.evidence import DECISIVE_EXCESS
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.challenges import (
     NOT_EXCLUDED,
@@ -19,7 +20,7 @@ from creepkit.inverse.selection.challenges import (
     challenges_of,
     share_residual,
 )
-from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, equivalent_laws
+from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.perturbation_trials import Trial
 from creepkit.inverse.selection.ranking import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -318,7 +319,7 @@ def test_a_power_law_is_also_a_sinh_and_a_hardening_that_does_not_harden():
     sinh = found[frozenset(("norton", "hyperbolic-sine"))]
     assert sinh.reduction == ""
     assert "over 40 to 60 MPa their local exponents are" in sinh.sentence
-    assert sinh.chi_square < DISTINGUISHABLE_CHI_SQUARE
+    assert sinh.chi_square < DECISIVE_EXCESS
 
 
 def test_over_a_wide_range_of_stress_a_sinh_is_no_power_law():

@@ -115,7 +115,7 @@ def test_a_planted_single_law_is_found(reduced):
     for name, truth in (("n_2", 3.5), ("m_1", -0.4)):
         estimate = next(e for e in reduced.estimates if e.name == name)
         assert estimate.value == pytest.approx(truth, abs=4 * (estimate.high - estimate.low) / 3.92)
-    assert reduced.sparsity.bic_difference < 0
+    assert reduced.sparsity.score_difference < 0
     assert reduced.sparsity.p_value > 0.01
 
 
@@ -123,7 +123,7 @@ def test_the_norm_of_the_paper_leaves_the_terms_of_a_planted_law(reduced):
     """Where terms come back until BIC is not above that of the sum, the planted one is among them."""
     fit = identify_sparse(COMBINED, reduced.histories, EXACT, penalty="l2", settings=QUICK)
     assert STRAIN in fit.sparsity.kept_terms
-    assert fit.sparsity.bic_difference <= 0
+    assert fit.sparsity.score_difference <= 0
     assert fit.values["n_2"] == pytest.approx(3.5, abs=0.5)
 
 
