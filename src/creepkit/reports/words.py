@@ -27,7 +27,7 @@ HEADLINES = {
 
 TRUTHS = {
     # no noise is stated, and too few readings show it
-    "not judged": "whether it is true cannot be judged",
+    "not judged": "whether it is true is unknown",
     # the p-value is 0.3 % or more
     "explains": "the tests do not reject it",
     # what it misses lies in single tests, or in two groups of them (their sentence follows)
