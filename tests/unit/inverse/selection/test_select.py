@@ -346,9 +346,8 @@ def test_the_evidence_is_the_probability_of_the_readings_with_the_parameters_int
     rows = jacobian.reshape(-1, 3) * sd
     whole = np.eye(TESTS * ENTRIES) + rates + rows @ rows.T
     assert occam_penalty(linear, factor) + factor.log_determinant == pytest.approx(np.linalg.slogdet(whole)[1])
-    level, nothing = (occam_penalty(linear.of([k]), factor) for k in (0, 2))
-    assert level == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))
-    assert nothing == 0.0
+    assert occam_penalty(linear.of([0]), factor) == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))
+    assert occam_penalty(linear.of([2]), factor) == 0.0
 
 
 def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
