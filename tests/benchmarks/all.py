@@ -81,6 +81,7 @@ BENCHMARKS = {
     "noise_correlation": Benchmark(4),
     "conditions": Benchmark(30),
     "law_search": Benchmark(45, (("--laws", "13"),), short=("--laws", "1", "--budget", "10")),
+    "law_search_outside": Benchmark(15, short=("--truths", "mechanisms in series", "--budget", "10")),
     "law_search_measured": Benchmark(6, needs=f"{DATA}; gplearn 0.4.3 elsewhere, with --gplearn PYTHON"),
     "rate_tables": Benchmark(20, needs=DATA),
     "hostile_files": Benchmark(40, needs="gcc, for exported C", short=("--short", "--first", "700000")),
