@@ -17,6 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, HistoryError, quoted
+from creepkit.files.time_stamps import is_clock_time
 
 ERROR_VALUES = ("#REF!", "#DIV/0!", "#N/A", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#CALC!", "#####")
 """What spreadsheets write for a value that could not be computed or shown; no remark begins so."""
@@ -36,6 +37,12 @@ _CONTROL_BYTES = bytes(sorted({*range(32), 127} - {9, 10, 12, 13}))
 
 _SAMPLE_LINES, _SAMPLE_CHARACTERS = 200, 4000
 """Lines, and characters of each, that decide on the delimiter; on the decimal sign all lines decide."""
+
+
+class AmbiguousNumber(HistoryError):
+    """A number with one comma before three digits where no other tells what the comma is; number : as it is written."""
+
+    number: str
 
 
 @dataclass(frozen=True)
@@ -65,12 +72,6 @@ NUMBERS = {
 
 _GROUPED = re.compile(r"[+-]?\d+(?:[.,'’  \s]\d+)+(?:[eEdD][+-]?\d+)?", re.ASCII)
 """Digits in groups, with several separators or with one that is no decimal sign."""
-
-
-_CLOCK_TIME = re.compile(
-    r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ] *\d.{0,20})?|\d{1,6}:\d{2}(?::\d{2}(?:[.,]\d{1,12})?)?"
-)
-"""A date, a time stamp or an elapsed time: as sound a cell as a number."""
 
 
 _WITH_UNIT = re.compile(r"[+-]?\d[\d.,]* ?[^\W\d_].{0,10}|[+-]?\d[\d.,]* ?°[CFK]")
@@ -154,8 +155,8 @@ def text_lines(text: str) -> list[str]:
 def detect_dialect(lines: Iterable[str], location: str = "", decimal: str | None = None) -> Dialect:
     """The dialect of the lines of a table: its line of names and its rows, without comments.
 
-    decimal : the decimal sign, where it is known. HistoryError, beginning with `location`, where
-    `1,234` may be 1234 as well as 1.234, and no other number tells.
+    decimal : the decimal sign, where it is known. AmbiguousNumber, beginning with `location`, where `1,234` may be 1234
+    as well as 1.234, and no other number tells.
     """
     filled = (line for line in lines if line and not line.isspace())
     sample = list(islice(filled, _SAMPLE_LINES))
@@ -294,7 +295,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         for cell in (cell.rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = NUMBERS["."].fullmatch(cell) or (delimiter != "," and NUMBERS[","].fullmatch(cell))
-                numbers += 1 if is_numeric or _CLOCK_TIME.fullmatch(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
+                numbers += 1 if is_numeric or is_clock_time(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
     return bool(counts), numbers, 0 if delimiter == " " else max(counts.values(), default=0)
 
 
@@ -324,11 +325,15 @@ def _decimal(lines: Iterable[str], delimiter: str, place: str) -> str:
             elif "." in cell and NUMBERS["."].fullmatch(cell):
                 points += 1
     if doubtful and not commas and not points:
-        raise HistoryError(
-            f"{place}'{doubtful}' may be {doubtful.replace(',', '.')} or {doubtful.replace(',', '')}; write decimal "
-            "points, or '# decimal: comma' in the head of the file"
-        )
+        error = AmbiguousNumber(f"{place}{two_readings(doubtful)}; write decimal points and no separators")
+        error.number = doubtful
+        raise error
     return "," if commas > points else "."
+
+
+def two_readings(number: str) -> str:
+    """What a number with one comma before three digits may be."""
+    return f"'{number}' may be {number.replace(',', '.')} or {number.replace(',', '')}"
 
 
 def _possible_numbers(line: str, delimiter: str) -> list[str]:

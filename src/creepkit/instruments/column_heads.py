@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.readers.vocabulary import split_written_name, unit_suffix
@@ -38,8 +37,8 @@ _KNOWN = [
 ]
 
 
-MINUTES_AND_SECONDS = re.compile(r"(?<![a-z:])(?:m|mm|min):(?:s|ss|sec)(?![a-z])", re.IGNORECASE)
-"""A unit of cells such as 12:30 that makes them 12.5 min, where a clock shows hours and minutes."""
+MINUTES_AND_SECONDS = re.compile(r"(?<![a-z:])(?:(?:m|mm|min):(?:s|ss|sec)|d+:h+(?::m+)?)(?![a-z])", re.IGNORECASE)
+"""A unit of cells such as 12:30 that makes them 12.5 min, or days and hours, where a clock shows hours and minutes."""
 
 
 def _unit(text: str) -> Unit | None:
@@ -70,20 +69,11 @@ TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
 """Units of channels and of times, for errors."""
 
 
-def near_unit(text: str) -> str:
-    """The known unit that a text may mean but does not say, such as "MPa" for "mPa" or "C" for "c"; "" if none."""
-    unit = " ".join(text.split())
-    if not unit or channel_unit(unit) is not None or time_factor(unit):
-        return ""
-    alike = [known for known in _KNOWN if known.lower() == unit.lower()]
-    return next(iter(alike or (get_close_matches(unit, _KNOWN, 1, 0.74) if len(unit) > 2 else ())), "")
-
-
-def near_unit_of_name(name: str) -> tuple[str, str]:
-    """The last word of a channel's name and the unit that it may mean, such as ("mPa", "MPa") of "P_mPa"; else ""."""
-    words = re.split(r"[\s_/,]+", name.strip())
-    unit = near_unit(words[-1]) if len(words) > 1 else ""
-    return (words[-1], unit) if unit else ("", "")
+def in_other_capitals(text: str) -> str:
+    """The known unit that a text, the last word of which may name one, has in other capitals, as mPa; "" if none."""
+    unit = re.split(r"[\s_/,]+", text.strip())[-1]
+    is_known = len(unit) < 2 or channel_unit(unit) is not None or time_factor(unit)
+    return "" if is_known else next((known for known in _KNOWN if known.lower() == unit.lower()), "")
 
 
 def reference_in_name(name: str) -> str:

@@ -18,8 +18,7 @@ from creepkit.instruments.column_heads import (
     MINUTES_AND_SECONDS,
     ChannelUnit,
     channel_unit,
-    near_unit,
-    near_unit_of_name,
+    in_other_capitals,
     reference_in_name,
     split_head,
     stated_unit,
@@ -149,19 +148,10 @@ class _Column:
 
     def _unknown_unit(self, head: TableHead) -> list[str]:
         """What is to be said of a channel without a known unit; HistoryError where capitals decide, as in mPa."""
-        name = self.name
-        found, meant = (self.unit, near_unit(self.unit)) if self.unit else near_unit_of_name(name)
-        if found.lower() == meant.lower() and len(meant) > 1:
-            advice = "" if self.unit else f", or state units={{'{quoted(name, 60)}': '{meant}'}}"
-            raise HistoryError(
-                f"{head.place}: '{found}' in the head of '{quoted(name, 60)}' is no unit; write {meant} into the head "
-                f"if that is meant{advice}"
-            )
-        if meant:
-            return [
-                f"{name}: taken for numbers without a unit; if '{found}' means {meant}, write {meant} into the head"
-            ]
-        return [f"{name}: numbers in '{self.unit}', which is not converted"] if self.unit else []
+        if meant := in_other_capitals(self.unit or self.name):
+            what = f"the unit of '{quoted(self.name, 60)}' is {meant} in other capitals; write {meant} into the head"
+            raise HistoryError(f"{head.place}: {what} if that is meant")
+        return [f"{self.name}: numbers in '{self.unit}', which is not converted"] if self.unit else []
 
 
 @dataclass(frozen=True)

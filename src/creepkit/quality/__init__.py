@@ -9,7 +9,6 @@ nothing crept.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import get_args
 
@@ -24,6 +23,7 @@ from creepkit.quality.idle_time import idle_flags
 from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_deviations
 from creepkit.quality.rig import expansion_flags, find_jumps, jump_flags, record_flags
+from creepkit.readers.ends_of_tests import invalidity_said_by
 from creepkit.records import History, known_specimens, output_named
 
 __all__ = [
@@ -101,20 +101,11 @@ def _unstated_moduli(histories: Sequence[History]) -> Iterator[QualityFlag]:
         yield QualityFlag(tuple(names), "modulus", (), "no simulation goes without it", proposal=STATE_MODULUS)
 
 
-_EXCLUDED = re.compile(
-    r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
-    r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
-    r"|ne pas utiliser|non valide|\bessai (?:nul|invalide)\b",
-    re.IGNORECASE,
-)
-"""What a laboratory writes of a test that does not count."""
-
-
 def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
     """Tests of which a remark says that they do not count."""
     for history in histories:
         for label, text in history.labels.items():
-            if label != "assumed" and _EXCLUDED.search(text):
+            if label != "assumed" and invalidity_said_by(text) == "invalid":
                 line = f'[[exclude]] test = "{history.name}" reason = "its remark"'
                 advice = f"to leave it out write into study.toml, in three lines: {line}"
                 yield QualityFlag((history.name,), "remark", (), f"'{label}' says '{text}'", proposal=advice)

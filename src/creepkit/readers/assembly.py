@@ -14,7 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.compression import as_compressed, is_compression
+from creepkit.readers.compression import as_compressed, is_compression, take_height
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -94,6 +94,7 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
+    take_height(conditions, name)
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = from_loading_on(conditions, frames)
@@ -120,7 +121,7 @@ def assemble_history(
     if "strain" in outputs and loading.quantity == "stress" and is_compression(conditions, name):
         loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
-        conditions.record_assumption("compression: its area grows, by which stresses are true ones", first=True)
+        conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
     if "strain" in outputs:
         stress = loading.program().at(frames.times) if loading.quantity == "stress" else None
         modulus = None if elastic is None else _modulus(elastic, temperature)
@@ -505,6 +506,10 @@ def _standard_deviations(
 def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     """Which frames a fit may use: those marked so, up to the end of the test; later ones saw the unloading."""
     used = np.asarray(frames.values.get("used", np.ones(frames.times.size)) == 1.0)
+    for label, text in conditions.labels.items():
+        if label.startswith("line ") and _EXTRAPOLATED.search(text):
+            used &= frames.lines != int(label[5:])
+            conditions.record_assumption(f"the {text} reading of {label} is not used".replace(",", ";"))
     end = conditions.take_number("end_time")
     if end is None:
         return used
@@ -514,6 +519,10 @@ def _used_frames(conditions: StatedConditions, frames: TableFrames) -> Bools:
     if after.any():
         conditions.labels["frames_after_end"] = str(int(after.sum()))
     return used & ~after
+
+
+_EXTRAPOLATED = re.compile(r"extrapol|estimat|geschätzt|estimé", re.IGNORECASE)
+"""Of a remark beside what is no reading."""
 
 
 def _end_of_test(

@@ -167,6 +167,8 @@ def _quantity_by_words(name: str, unit: str) -> str:
     plain = plain_words(name)
     if _RATE_SYMBOL.fullmatch(unicodedata.normalize("NFD", name)) and unit in RATE.units:
         return "minimum_rate"
+    if RATES.fullmatch(plain) and unit in RATE.units:  # in a table of creep tests
+        return "minimum_rate"
     is_rate = RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
     if is_rate and (unit in RATE.units or unit in ("", "pct")):
         return "minimum_rate"

@@ -1,7 +1,8 @@
 """Compression tests: a piece that is pressed gains area, where a bar under tension loses it.
 
 A file tells them by a word, or by negative stresses and strains. With e = 1 - h / h_0 of the height the logarithmic
-strain is -ln(1 - e), and the true stress the nominal one times 1 - e, which is what a law of a bar is given.
+strain is -ln(1 - e), and the true stress the nominal one times 1 - e, which is what a law of a bar is given. The height
+is its gauge length, unless one is stated.
 """
 
 from __future__ import annotations
@@ -25,8 +26,15 @@ TENSION = re.compile(r"tensi|traction|zug", re.IGNORECASE)
 
 def is_compression(conditions: StatedConditions, name: str) -> bool:
     """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
-    said = (name, *conditions.labels, *conditions.labels.values(), *conditions.assumed)
+    said = (name, conditions.text_of("name"), *conditions.labels, *conditions.labels.values(), *conditions.assumed)
     return any(WORDS.search(text) and not TENSION.search(text) for text in said)
+
+
+def take_height(conditions: StatedConditions, name: str) -> None:
+    """Make the height of a piece that is compressed its gauge length, where none is stated."""
+    if {"height", "gauge_length"} & conditions.geometry.keys() == {"height"} and is_compression(conditions, name):
+        height = conditions.geometry["gauge_length"] = conditions.geometry.pop("height")
+        conditions.record_assumption(f"the height {height:g} mm is the gauge length")
 
 
 def as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:

@@ -14,10 +14,11 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from creepkit.errors import CreepkitError, HistoryError
+from creepkit.errors import CreepkitError, HistoryError, quoted
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
+    LABEL,
     STOPPED,
     UNCLEAR,
     MarkedTime,
@@ -25,7 +26,7 @@ from creepkit.readers.ends_of_tests import (
     kind_of_column,
     marked_time,
 )
-from creepkit.readers.questions import Question, collected, raise_all
+from creepkit.readers.questions import Answer, Question, collected, raise_all
 from creepkit.readers.table import SourceText
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
@@ -52,6 +53,11 @@ _HELD = {
     "load": re.compile(r"\bloads?\b.*\w\W|\W.*\bload\b|dead|\blast\b|kraft|gewicht|weight"),
 }
 """{what was held: words by which laboratories say so}."""
+
+
+_SMOOTH = re.compile(r"\b(?:smooth|plain|un-?notched|glatt|ungekerbt|lisse|non entaill)")
+_NOTCHED = re.compile(r"\bnotch|\bgekerbt|\bkerb|\bentaill|\bk_?t\b")
+"""Of what a text calls a specimen: of a bar without a notch, and of one with."""
 
 
 END_OF_TEST_TERMS = ("ruptured", "stopped")
@@ -186,14 +192,17 @@ class StatedConditions:
         sentence = f"no {what}{label_note}; {advice}"
         return self.question(sentence, key) if key else HistoryError(f"{self.location}: {sentence}")
 
-    def question(
-        self, sentence: str, key: str, *choices: str | float, location: str = "", is_free: bool = True
-    ) -> Question:
+    def question(self, sentence: str, key: str, *choices: Answer, location: str = "", is_free: bool = True) -> Question:
         """The question of a condition, which the key states; choices : likely values."""
         place = location or self.location
         path = Path(re.sub(r"(?:, sheet '.*|:\d+)$", "", place))
         place += f" ({self.labels['format']})" if "format" in self.labels else ""
         return Question(path, place, sentence, key, choices, is_free=is_free)
+
+    def ask_of_label(self, words: re.Pattern[str], sentence: str) -> None:
+        """Raise the question whether what a name with these words states is a label, unless an answer says so."""
+        if name := next((one for one in self.labels if words.search(one) and one not in self._vocabulary.labels), ""):
+            raise self.question(f"'{quoted(name, 60)}' {sentence}, it is a label", "columns", {name: LABEL})
 
     def all_labels(self) -> dict[str, str]:
         """The labels, with what was assumed; refuses numbers and texts that nothing has used."""
@@ -281,7 +290,12 @@ class StatedConditions:
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
         name = entry.text.casefold()
-        if SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or name in self.terms.outputs:
+        if _SMOOTH.search(name) and name not in self.terms.outputs:
+            self._put(self.labels, "specimen", entry.text, entry)
+        elif _NOTCHED.search(name) and name not in self.terms.outputs:
+            what = f"'{quoted(entry.text, 60)}' is said of the specimen; which is it?"
+            raise self.question(what, "specimen", "notched-bar", "uniaxial", location=entry.location)
+        elif SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or name in self.terms.outputs:
             self._put(self._texts, "specimen", replace(entry, text=name), entry)
         elif near := get_close_matches(name, self.terms.outputs, 1, cutoff=CLOSE_SPELLING):
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")

@@ -44,6 +44,7 @@ from creepkit.readers.conditions import StatedConditions
 from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import OUTLIERS, hold_begins, under_load, unloaded
 from creepkit.readers.table import SourceText
+from creepkit.readers.table_heads import LOAD_AGREEMENT
 from creepkit.readers.vocabulary import split_written_name, unit_suffix
 from creepkit.records.loading import Program
 from creepkit.records.quantities import LENGTH, STRAIN, TIME
@@ -168,6 +169,7 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
     elongation, length = values.pop("elongation"), conditions.geometry.get("gauge_length")
     if "strain" in values:
         return ["the extension beside the strain not used"]
+    conditions.ask_of_label(_COMPLIANCE, "leaves open whether the extension is without the machine's part; if it is")
     if length is None:
         what = "an extension is a strain by its gauge length, which is not stated; write gauge_length_mm (or 'specimen:"
         place = frames.table.location(frames.table.columns_line)
@@ -178,6 +180,8 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
     return [f"strain = extension / gauge length {length:g} mm"]
 
 
+_LEVER = re.compile("lever|hebel|levier", re.IGNORECASE)
+_COMPLIANCE = re.compile("compliance|nachgiebigkeit|complaisance", re.IGNORECASE)
 _LENGTH_NAME = re.compile("length|länge|longueur", re.IGNORECASE)
 _LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
 
@@ -204,7 +208,14 @@ def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict
             area = float(np.median(column[on][held:])) / nominal.value
             how = f" by which the load that was held is {nominal.value:g} MPa"
     elif "stress" in values or conditions.states_load("stress"):
+        has_lever = any(map(_LEVER.search, conditions.labels))
+        if nominal is not None and stated is not None and area is not None and not has_lever:
+            of_load = stated.value / area
+            if abs(of_load - nominal.value) > LOAD_AGREEMENT * nominal.value:
+                what = f"the load makes {of_load:.4g} MPa on {area:.4g} mm2{how}, and {nominal.location} says"
+                raise HistoryError(f"{stated.location}: {what} {nominal.value:g} MPa; correct one of them")
         return ["the load beside the stress not used"]
+    conditions.ask_of_label(_LEVER, "leaves open whether the load is that on the specimen; if it is")
     if area is None:
         where = stated.location if stated is not None else frames.table.location(frames.table.columns_line)
         what = "a load is a stress by the cross-section, which is not stated; write diameter_mm, or width_mm and"
@@ -237,7 +248,7 @@ def without_unloaded_readings(conditions: StatedConditions, frames: TableFrames)
     Several such frames one after another show a pause, which is part of the program.
     """
     off = unloaded(frames, conditions.terms)
-    alone = off & ~np.roll(off, 1) & ~np.roll(off, -1)
+    alone = off & ~np.roll(off, 1) & ~np.roll(off, -1) & ~np.isin(frames.lines, [*frames.marked])
     if not 0 < alone.sum() <= max(1.0, OUTLIERS * alone.size):
         return frames
     places = " and ".join(time_text(float(time)) for time in frames.times[alone])
@@ -322,8 +333,9 @@ SEARCHED_FRAMES = 20
 """Frames among which the end of loading is looked for."""
 
 
-SMALLEST_STRAIN, NOISE_FACTOR = 2e-5, 6.0
-"""A strain at time zero below it, or below so many standard deviations of the noise, is none."""
+SMALLEST_STRAIN, NOISE_FACTOR, OFFSET, FEWEST_OF_CURVE = 2e-5, 6.0, 0.1, 5
+"""A strain at time zero below it, or below so many standard deviations of the noise, is none; part of its range below
+which a negative one is that of a transducer that was not set to zero; readings that show the noise about a curve."""
 
 
 @dataclass(frozen=True)
@@ -357,6 +369,10 @@ def without_loading(
     total, end = conditions.take_number("loading_strain"), conditions.take_number("loading_time")
     includes_loading = conditions.take_choice("includes_loading", ("yes", "no"), required=False)
     stated = conditions.states("includes_elastic")
+    if total is not None and ", column '" in conditions.location_of("includes_elastic"):
+        if conditions.take_text("includes_elastic") == "yes":  # "Total strain" holds all of it (ISO 204)
+            includes_loading = includes_loading or "yes"
+        stated = False
     if end is not None:
         used = used & (times >= end.value * (1 - 1e-9))
         if not used.any():
@@ -396,7 +412,7 @@ def _loaded_by_ramp(
     else with that of the ramp; any other at its end is subtracted.
     """
     end = _frames_of_ramp(times, stress)
-    noise = noise_of_readings(strain[end : end + SEARCHED_FRAMES])
+    noise = _noise_of_creep(times[end:], strain[end:])
     if not end or strain[end] - strain[0] < max(SMALLEST_STRAIN, NOISE_FACTOR * noise):
         return None
     used = used & (times >= times[end])
@@ -424,7 +440,8 @@ def _decided(
     frames = np.flatnonzero(used)
     if frames.size > 2 and times[frames[0]] == 0.0:
         first = float(strain[frames[0]])
-        if first > max(SMALLEST_STRAIN, NOISE_FACTOR * noise_of_readings(strain[frames[:SEARCHED_FRAMES]])):
+        least = max(SMALLEST_STRAIN, NOISE_FACTOR * _noise_of_creep(times[frames], strain[frames]))
+        if first > least or first < -max(SMALLEST_STRAIN, OFFSET * float(np.ptp(strain[frames]))):
             ratio = f"{first / elastic_strain:.2f} of stress over modulus" if elastic_strain else ""
             if elastic_strain and _is_elastic(first, elastic_strain, ELASTIC_RANGE):
                 conditions.record_assumption(f"includes_elastic yes (the strain at time 0 is {ratio})")
@@ -445,9 +462,17 @@ def _decided(
     return StrainRecord(strain, used, included == "yes")
 
 
+def _noise_of_creep(times: Floats, strain: Floats) -> float:
+    """The noise of the first frames under load, whose curve is not even in time; times, strain : (frames,) s and -."""
+    searched = slice(int(times[0] == 0.0), SEARCHED_FRAMES)
+    if strain[searched].size < FEWEST_OF_CURVE:
+        return noise_of_readings(strain)
+    return noise_of_readings(strain[searched], times[searched], order=3)
+
+
 def _end_of_loading(times: Floats, strain: Floats, elastic_strain: float) -> int | None:
     """The first frame of a plateau of about the elastic strain, None where the strain shows none."""
-    noise = noise_of_readings(strain[:SEARCHED_FRAMES])
+    noise = _noise_of_creep(times, strain)
     for k in range(1, min(SEARCHED_FRAMES, times.size - 2)):
         if not _is_elastic(float(strain[k]), elastic_strain, PLATEAU_RANGE):
             continue

@@ -60,25 +60,29 @@ _NOT = (
 )
 _FILLERS = (
     r"(?: (?:yet|a|any|been|be|has|have|the|specimen|sample|test|bar|probe|noch|der|die|den|de|d|la|l|le|ete|encore|est"
-    r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due))*"
+    r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due|bis|jusqu|au|a|zu))*"
 )
+_NO_READING = "".join(f"(?<!{one} )" for one in ("reading", "value", "point", "frame", "messung", "messwert", "mesure"))
 _AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
 _EXPECTED = _words(
-    r"before|prior|avant|vor|bevor|could|would|might|may|should|konnte|pourrait|near|close to|nearly|almost",
+    r"before|prior|avant|vor|bevor|could|would|might|may|should|konnte|pourrait|nearly|almost",
+    rf"(?:near(?:ing)?|close to){_FILLERS} (?:{_RUPTURE})",
     r"imminent|expected|likely|will|soon|kurz vor|fast|still|noch|yet|encore|toujours|pending|outstanding|aus",
     r"beinahe|erwartet|bald|wird|soll|presque|proche|prevue?|attendue?|bientot|if",
 )
 _REACHED = (
     r"(?: (?:reached|attained|obtained|obtenue?|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten"
-    r"|atteinte?|observee?|survenue?))*"
+    r"|atteinte?|observee?|survenue?|occur|ein))*"
 )
 _UNBROKEN = re.compile(
-    rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
-    rf"|fail(?:ed|s)? to (?:{_RUPTURE})|(?:{_RUPTURE}) (?:noch )?(?:{_NOT}){_REACHED}(?= ?(?:\||$)))(?!\w)"
+    rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|{_NO_READING}(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
+    rf"|fail(?:ed|s)? to (?:{_RUPTURE})"
+    rf"|(?:{_RUPTURE})(?: (?:noch|n a|did|was|has|trat|wurde|ist|est))? (?:{_NOT})(?: ete)?{_REACHED}"
+    r"(?= ?(?:\||$)))(?!\w)"
 )
 _UNCENSORED = re.compile(rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_CENSORED})|un(?:{_CENSORED}))(?!\w)")
 _NOT_INTERRUPTED = re.compile(
-    rf"(?<!\w)(?:(?:{_NOT}|plus|longer){_FILLERS} (?:{_GOES_ON}|{_INTERRUPTED})|lauft (?:nicht|nimmer))(?!\w)"
+    rf"(?<!\w)(?:(?:{_NOT}|plus|no longer){_FILLERS} (?:{_GOES_ON}|{_INTERRUPTED})|lauft (?:nicht|nimmer))(?!\w)"
 )
 _ENDED = _words(r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date")
 _DOUBTFUL = _words(
@@ -86,8 +90,17 @@ _DOUBTFUL = _words(
     r"furnace|oven|thermocouples?|tc|power|mains|grips?|machine|rig|heaters?|heating|controller|extensometer|lvdt",
     r"lever|pull rod|adapter|ofen|ofens|thermoelemente?s?|strom|stromausfall|netz|einspannung|maschine|heizung",
     r"regler|gestange|four|thermocouple|courant|regulation|extensometre|equipment|chauffage",
+    r"versuchsende|(?:after|nach|apres)(?: the| dem| l)? (?:tests?|end|versuch|essai)|by hand|von hand|a la main",
+    r"(?:failure|rupture|fracture|breakage|bruch) (?:of the|de la|de l|der|des|du) (?!specimen|sample|test|bar|piece"
+    r"|probe|prufling|eprouvette|ga[u]?ge|weld|partie|steel|alloy|material|werkstoff|stahl|alliage|acier|legierung)[a-z]+",
 )
-"""Words of what breaks in the place of a test, or of what it broke by."""
+"""Words of what breaks in the place of a test, of what it broke by, or that it broke when the test was over."""
+
+
+_METHOD = _words(
+    r"(?:creep |stress |zeitstand)?rupture (?:test|testing|tests|machine|rig|curve|data)|essais? de (?:fluage )?rupture"
+)
+"""Names of the method, which say nothing of an end."""
 
 
 @lru_cache(maxsize=4096)
@@ -114,26 +127,43 @@ def end_said_by(text: str) -> str:
     plain, said = plain_words(text), set[str]()
     if plain.endswith("?"):
         return UNCLEAR if end_said_by(plain.rstrip("? ")) else ""
-    for pattern, what in ((_UNBROKEN, STOPPED), (_UNCENSORED, RUPTURED), (_NOT_INTERRUPTED, UNCLEAR)):
+    plain = _METHOD.sub(" ", plain)
+    for pattern, what in ((_UNBROKEN, STOPPED), (_UNCENSORED, RUPTURED)):
         plain, count = pattern.subn(" ", plain)
         said |= {what} if count else set()
+    plain, goes_no_more = _NOT_INTERRUPTED.subn(" ", plain)
+    aside = plain_words(" | ".join(re.findall(r"[(\[]([^)\]]*)", text)))  # "failed (grip slipped)"
     goes_on, breaks, stops = _words(_GOES_ON), _words(_RUPTURE), _words(_INTERRUPTED)
     for clause in plain.split("|"):
         if goes_on.search(clause):
             said.add(STOPPED)
             clause = goes_on.sub(" ", clause)
         if breaks.search(clause):
-            is_doubtful = _DOUBTFUL.search(clause) or _EXPECTED.search(clause) or _words(_NOT).search(clause)
+            subjects = re.findall(rf"([^\W\d]\w*) (?:{_RUPTURE})(?!\w)", clause)
+            is_doubtful = (
+                _DOUBTFUL.search(f"{clause} | {aside}")
+                or _EXPECTED.search(clause)
+                or _words(_NOT).search(clause)
+                or not all(_NEUTRAL.fullmatch(one) or _BEFORE_RUPTURE.fullmatch(one) for one in subjects)
+            )
             without = re.search(rf"(?:{_RUPTURE}) (?:without|ohne|sans) ", clause)
             said.add(UNCLEAR if is_doubtful and not without else RUPTURED)
         if stops.search(clause):
             said.add(INTERRUPTED)
     if STOPPED in said:
         said.discard(INTERRUPTED)
-    return said.pop() if len(said) == 1 else UNCLEAR if said or _ENDED.search(plain) else ""
+    return said.pop() if len(said) == 1 else UNCLEAR if said or goes_no_more or _ENDED.search(plain) else ""
 
 
-_INVALID = _words(r"invalid\w*|void|not valid|disregard|ungultig\w*|nicht gultig|verworfen|non valides?|invalides?|nul")
+_INVALID = re.compile(
+    r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
+    r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
+    r"|ne pas utiliser|non valide|not valid|disregard|verworfen|\binvalid\b|\bessai (?:nul|invalide)\b",
+    re.IGNORECASE,
+)
+"""What a laboratory writes of a test that does not count."""
+
+
 _ELSEWHERE = re.compile(
     r"outside(?: of)?(?: the)? ga[u]?ge|out of ga[u]?ge|ausserhalb (?:der )?mess|hors (?:de )?(?:la )?(?:longueur|zone)"
     r"|(?:at|in|near) (?:the )?(?:grips?|shoulders?|fillets?|threads?)|grip failure"
@@ -144,7 +174,7 @@ _ELSEWHERE = re.compile(
 def invalidity_said_by(text: str) -> Literal["invalid", "elsewhere", ""]:
     """Whether a text says that a test is invalid, or that it broke elsewhere than in its gauge length."""
     plain = plain_words(text)
-    return "invalid" if _INVALID.search(plain) else "elsewhere" if _ELSEWHERE.search(plain) else ""
+    return "invalid" if _INVALID.search(text) else "elsewhere" if _ELSEWHERE.search(plain) else ""
 
 
 YES = frozenset(
@@ -206,6 +236,17 @@ _NEUTRAL = _words(
     r"intergranulaire\w*|transgranulaire\w*|oxyd\w*|et|tete|mode|[a-z]{0,3}\d[\w]*",
 )
 """Words of remarks that tell something else than an end: what a specimen looks like, where it stems from."""
+
+
+_BEFORE_RUPTURE = _words(
+    _RUPTURE,
+    r"is|was|has|had|have|been|it|then|finally|later|tests?|piece|to|until|till|by|when|after|stress|strain|tertiary|final",
+    r"early|late|premature\w*|suddenly?|complete\w*|fully?|partial\w*|clean|shear|tensile|cone|metal|haz|iv|material",
+    r"base|parent|found|ended|ends?|ran|on|due|time|h|hours?|days?|reached|steel|alloy|not|ist|wurde|war|hat|bis|zum|zu",
+    r"nach|durch|mit|am|dann|endgultig\w*|prufling|probekorper|stab|werkstoff|vorzeitig\w*|est|ete|s|eprouvettes?|apres",
+    r"puis|par|jusqu|en|brutale?|nette|finale?|prematuree?|essai|metaux|duktiler|l",
+)
+"""Words that stand before one of rupture where the specimen broke: any other is of what else did."""
 
 
 def is_neutral(text: str) -> bool:

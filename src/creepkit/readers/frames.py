@@ -25,6 +25,10 @@ NOISE_OF_ZERO = 0.01
 """Of the largest reading of a load: a reading that is less below zero is one of none."""
 
 
+LATEST_START = 1e9
+"""s, 32 years: times that begin later are those of a calendar."""
+
+
 @dataclass(frozen=True)
 class TableFrames:
     """The frames of one test.
@@ -94,6 +98,9 @@ def read_frames(
         place, names = table.location(table.columns_line), table.written or table.columns
         result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
         raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
+    if values["time"][0] > LATEST_START:  # s since 1970, days since 1900
+        values["time"] = values["time"] - values["time"][0]
+        notes.append("times since the first reading")
     if _COMPRESSION in notes and "strain" in values and values["strain"].max() <= 0.0:
         values["strain"] = -values["strain"]
     if "x" in map(str.casefold, found.values()) and (np.diff(values["time"]) < 0.0).any():
@@ -257,10 +264,10 @@ def _without_readings_before_steps(frames: TableFrames, imposed: Sequence[Floats
 
 
 def _strictly_increasing(frames: TableFrames) -> TableFrames:
-    """Refuse a time that falls; merge frames of equal time into their mean.
+    """Refuse a time that falls; merge frames of equal time, of a clock coarser than the recording, into their mean.
 
-    A clock that is coarser than the recording, or a last reading at rupture, gives several frames one time. Their
-    mean favours none of them; how many were merged is kept.
+    At the first time the last one counts, which is that behind loading, and at the last time the first, which is that
+    before rupture; how many were merged is kept.
     """
     time_differences = np.diff(frames.times)
     if (time_differences < 0).any():
@@ -270,6 +277,8 @@ def _strictly_increasing(frames: TableFrames) -> TableFrames:
     first = np.flatnonzero(np.concatenate(([True], time_differences > 0)))
     counts = np.diff(np.append(first, frames.times.size))
     values = {name: np.add.reduceat(column, first) / counts for name, column in frames.values.items()}
+    for name, column in frames.values.items():
+        values[name][[0, -1]] = column[[counts[0] - 1, first[-1]]]
     if first.size < 2:
         raise HistoryError(f"{frames.location(0)}: only one frame in time; at least two are needed to identify a law")
     return TableFrames(frames.table, values, frames.lines[first], frames.times.size - first.size, frames.marked)

@@ -6,7 +6,8 @@ and recorded, or asked for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 from math import erf
 from typing import Literal
@@ -146,11 +147,20 @@ def _control(conditions: StatedConditions, *, varies: bool) -> str:
     if meant and not conditions.states("control"):
         conditions.record_assumption(f"control {meant}, for the stress is the {measure} one")
         return meant
+    held = [(k, text) for k, text in conditions.labels.items() if _TRUE_STRESS_HELD.search(text)]
+    if held and not meant and not conditions.states("control"):
+        what = f"'{held[0][0]}' says '{held[0][1]}'; was the true stress held, or the load?"
+        raise conditions.question(what, "control", "stress", "load", is_free=False)
     control = conditions.take_choice("control", ("load", "stress"), required=True)
     if varies and meant and control != meant:
         what = f"stress_measure is {measure} and control is {control}, but an engineering stress that changes is a load"
         raise HistoryError(f"{location}: {what}, and a true one a stress; keep one of the two")
     return control
+
+
+_TRUE_STRESS_HELD = re.compile(
+    r"constant (?:true )?stress|konstante[rn]? (?:wahre[rn]? )?spannung|contrainte (?:vraie )?constante", re.IGNORECASE
+)
 
 
 def _step_change(conditions: StatedConditions, quantity: str) -> TwoLevels | None:
@@ -358,7 +368,7 @@ def _recorded(
             return _ramp_and_hold(frames.times, held, start)
         conditions.record_assumption(f"strain 0 at time 0 (the ramp is read from {frames.times[0]:g} s on)")
         return _ramp_and_hold(np.append(0.0, frames.times), np.append(0.0, held), start + 1)
-    starts = _level_starts(column, tolerance)
+    starts = _level_starts(column, tolerance, np.flatnonzero(np.isin(frames.lines, [*frames.marked])))
     if not starts:
         begun, record = _from_rest(frames.times, column) if quantity == "strain" else (frames.times, column)
         program = recorded_program(begun, record, tolerance)
@@ -483,12 +493,16 @@ def _noise_of_level(column: Floats) -> float:
     return 8.0 * 1.05 * float(np.median(np.abs(np.diff(column))))
 
 
-def _level_starts(column: Floats, tolerance: float) -> list[int]:
-    """First frames of nominal levels, each but the last over two frames or more; [] where a column holds no such."""
+def _level_starts(column: Floats, tolerance: float, marked: Collection[int] = ()) -> list[int]:
+    """First frames of nominal levels; [] where a column holds no such.
+
+    Each but the last, and but those that begin at a frame whose change is marked, is of two frames or more.
+    """
     tolerance = max(tolerance, _noise_of_level(column))
     starts = [0, *(np.flatnonzero(np.abs(np.diff(column)) > tolerance) + 1).tolist()]
     parts = [column[first:last] for first, last in pairwise([*starts, column.size])]
-    held = all(one.size > 1 for one in parts[:-1]) and all(np.ptp(one) <= tolerance for one in parts)
+    are_long = all(one.size > 1 or first in marked for first, one in zip(starts[:-1], parts[:-1], strict=True))
+    held = are_long and all(np.ptp(one) <= tolerance for one in parts)
     return starts if held and len(starts) > 1 else []
 
 

@@ -22,7 +22,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import Dialect, detect_dialect, is_number, refuse_unprintable
+from creepkit.files.delimited_text import Dialect, is_number, refuse_unprintable
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
 from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import UNUSED, unknown_text
@@ -33,16 +33,18 @@ from creepkit.readers.table import (
     CellTable,
     SourceText,
     TableRow,
+    dialect_of,
     entry_of,
     is_comment,
     named_columns,
     refuse_long_cells,
     without_ignored,
     without_logarithms,
+    without_thousands,
 )
 from creepkit.readers.table_heads import conditions_in_text, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
-from creepkit.readers.tests_file import SEPARATE
+from creepkit.readers.tests_file import SEPARATE, answers_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, unit_suffix, words_of
 from creepkit.records import History
 
@@ -185,9 +187,10 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
         f"label cell {cell}": SourceText(text, f"{table.place}, comment of cell {cell}")
         for cell, text in notes.comments.items()
     }
-    filled = _with_merged(_with_points(rows, texts, table.place), notes.merged)
-    merged = _cells_below(rows, notes.merged)
-    return without_logarithms(replace(table, rows=filled, header=header, comments=late, merged=merged))
+    decimal, merged = answers_of(path).decimal, _cells_below(rows, notes.merged)
+    filled = _with_merged(_with_points(table, rows, texts, decimal), notes.merged)
+    table = replace(table, rows=filled, header=header, comments=late, merged=merged)
+    return without_logarithms(without_thousands(table, is_stated=bool(decimal)))
 
 
 def _entries(
@@ -268,14 +271,16 @@ _COMMA = re.compile(r"(?P<number>[<>≥]?\s*[+-]?\d*,(?P<part>\d+)(?:[eEdD][+-]?
 """A number with a comma and perhaps a unit, `0,10 %`."""
 
 
-def _with_points(rows: list[TableRow], texts: set[str], place: str) -> list[TableRow]:
+def _with_points(table: CellTable, rows: list[TableRow], texts: set[str], decimal: str) -> list[TableRow]:
     """The rows with decimal points in numbers that were entered as text with a decimal comma.
 
     Cells that are numbers have no decimal sign, so texts decide; of three digits behind a comma those without a unit.
+    decimal : the sign, where it is stated.
     """
     found = [match for text in texts if (match := _COMMA.fullmatch(text))]
     numbers = [match["number"].lstrip("<>≥ ") for match in found if not match["unit"] or len(match["part"]) != 3]
-    if not numbers or detect_dialect([f"{text}\t0" for text in numbers], place).decimal == ".":
+    lines = [f"{text}\t0" for text in numbers]
+    if not lines or dialect_of(lines, table.path, table.place, decimal).decimal == ".":
         return rows
     changed = {match[0]: match[0].replace(",", ".") for match in found}
     return [TableRow(row.line, [changed.get(cell, cell) for cell in row.cells]) for row in rows]

@@ -15,7 +15,7 @@ or `Time of day`, or the values: elapsed are times that begin below one hour or 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -238,18 +238,45 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
         what = f"'{written}' is in {suffix}, and its first cell is '{quoted(cells[0])}', a time of a clock"
         place = table.location(table.columns_line, clock)
         raise HistoryError(f"{place}: {what}; leave the unit out of the name, or write numbers")
+    pattern = _PATTERN.search(written)
+    units = [_SECONDS[one[0]] for one in pattern[0].lower().split(":")] if pattern else []
+    if units and units != [*_SECONDS.values()][1:] and words_of(split_written_name(written)[0]) not in OF_DAY:
+        return _with_times_by_pattern(table, clock, units)
     elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
     if elapsed[0]:
         seconds, assumption = _times_of(elapsed, table, clock, known.vocabulary.synonyms)
     else:
         seconds, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
-    columns[clock] = "time_s"
+    return _with_seconds(table, clock, seconds).assuming(*filter(None, (assumption,)))
+
+
+_PATTERN = re.compile(r"(?<![a-z])(?:d+|h+|mm?|min):(?:hh?|mm?|min|ss?)(?::(?:mm?|min|ss?))?(?![a-z])", re.IGNORECASE)
+_SECONDS = {"d": DAY, "h": 3600.0, "m": 60.0, "s": 1.0}
+"""Of what the name of a column says that its cells show, as `hh:mm`, `mm:ss` and `dd:hh:mm`."""
+
+
+def _with_seconds(table: CellTable, clock: int, seconds: Iterable[float]) -> CellTable:
+    """The table with times in s (rows,) in the place of a column."""
+    columns = ["time_s" if k == clock else name for k, name in enumerate(table.columns)]
     texts = [repr(float(time)).replace(".", table.dialect.decimal) for time in seconds]
     rows = [
         TableRow(row.line, [text if k == clock else cell for k, cell in enumerate(row.cells)])
         for row, text in zip(table.rows, texts, strict=True)
     ]
-    return replace(table.renamed(columns), rows=rows).assuming(*filter(None, (assumption,)))
+    return replace(table.renamed(columns), rows=rows)
+
+
+def _with_times_by_pattern(table: CellTable, clock: int, units: Sequence[float]) -> CellTable:
+    """The table with times in the place of cells such as 4:04:00; units : s, of each of their parts."""
+    seconds = list[float]()
+    for row in table.rows:
+        parts = row.cells[clock].split(":")
+        if len(parts) != len(units) or not all(is_number(part, Dialect()) for part in parts):
+            name = table.as_written(clock)
+            what = f"'{quoted(row.cells[clock])}' is not as '{name}' says; write all cells alike"
+            raise HistoryError(f"{table.location(row.line, clock)}: {what}")
+        seconds.append(sum(unit * float(part) for unit, part in zip(units, parts, strict=True)))
+    return _with_seconds(table, clock, seconds)
 
 
 def _times_of(

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,13 +24,18 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import (
     ERROR_VALUES,
+    AmbiguousNumber,
     Dialect,
+    detect_dialect,
     float_of,
     is_missing,
     is_number,
     parse_number,
     parse_numbers,
+    two_readings,
 )
+from creepkit.readers.ends_of_tests import kind_of_column
+from creepkit.readers.questions import Question
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
 MAXIMUM_CELL = 10_000
@@ -198,6 +203,46 @@ class CellTable:
         return letters
 
 
+# ---- commas --------------------------------------------------------------------------------------------------------
+
+
+def dialect_of(lines: Iterable[str], path: Path, place: str, decimal: str | None) -> Dialect:
+    """The dialect of the lines of a table; Question where a comma may be decimal or between thousands.
+
+    decimal : the decimal sign, where it is stated.
+    """
+    try:
+        return detect_dialect(lines, place, decimal)
+    except AmbiguousNumber as error:
+        raise Question(path, place, two_readings(error.number), "decimal", ("comma", "point")) from None
+
+
+_THOUSANDS, _WITH_COMMA = (
+    re.compile(rf"[<>≥(\[]*\s*[+-]?{digits}\s*[+*†)\]h→]*") for digits in (r"[1-9]\d{0,2}(?:,\d{3})+", r"\d*,\d+")
+)
+"""Numbers with commas, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
+
+
+def without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
+    """The table with decimal points without the commas between thousands of its numbers.
+
+    They are if the decimal point is stated (is_stated), or if several numbers have a comma, each before three digits;
+    a single one is asked about.
+    """
+    if table.dialect.decimal != ".":
+        return table
+    commas = [(row, cell) for row in table.rows for cell in row.cells if "," in cell]
+    found = [(row, cell) for row, cell in commas if _THOUSANDS.fullmatch(cell)]
+    if not found or any(_WITH_COMMA.fullmatch(cell) and not _THOUSANDS.fullmatch(cell) for _, cell in commas):
+        return table
+    row, cell = found[0]
+    if len(found) == 1 and cell.count(",") == 1 and not is_stated:
+        raise Question(table.path, table.location(row.line), two_readings(cell), "decimal", ("point",))
+    plain = {one: one.replace(",", "") for _, one in found}
+    rows = [TableRow(row.line, [plain.get(one, one) for one in row.cells]) for row in table.rows]
+    return replace(table, rows=rows).assuming(f"commas stand between thousands ({plain[cell]})")
+
+
 # ---- comments ------------------------------------------------------------------------------------------------------
 
 
@@ -220,7 +265,8 @@ def entry_of(line: str) -> tuple[str, bool, str]:
 
 
 _LOGARITHM = re.compile(
-    r"(?:log|lg)[ _]?(?:10|₁₀)?(?:[ _]+|(?=[(\[]))[(\[]?(?P<of>[^()\[\]]+)[)\]]?(?:\s*[(\[](?P<unit>[^()\[\]]+)[)\]])?"
+    r"(?:log|lg)[ _]?(?:10|₁₀)?(?:[ _]+|(?=[(\[]))[(\[]?(?P<of>[^()\[\]]+(?:\([^()]+\))?)[)\]]?"
+    r"(?:\s*[(\[](?P<unit>[^()\[\]]+)[)\]])?"
 )
 _MAY_BE_LOGARITHM = re.compile(
     r"t(?: ?[rfbu])?|(?:time|temps|[σε])(?: .*)?|.*(?:rate|stress|life|zeit|spannung|vitesse|contrainte)", re.IGNORECASE
@@ -329,12 +375,40 @@ def cells_of_width(table: CellTable, row: TableRow, width: int, *, beside: bool 
         cells = [*cells, *[""] * (width - len(cells))]
     if len(cells) == width or (beside and len(cells) > width):
         return cells
-    place = table.location(row.line)
     if table.sheet:
         foreign = quoted(next(filter(None, cells[width:])))
-        raise HistoryError(f"{place}: '{foreign}' stands in a column without a name; name it or remove it")
-    delimiter = str(table.dialect).partition(",")[0]  # a cell lost within a line of text moves those behind it
-    advice = ", empty ones too" * (len(cells) < width)
-    advice += "; decimal commas need another delimiter, such as ;" * (table.dialect.delimiter == ",")
-    what = f"number of cells {len(cells)}, of columns {width}; write one cell a column"
-    raise HistoryError(f"{place}: {what}, separated by {delimiter}{advice}")
+        what = f"'{foreign}' stands in a column without a name; name it or remove it"
+        raise HistoryError(f"{table.location(row.line)}: {what}")
+    raise _another_width(table, row, width)
+
+
+def _another_width(table: CellTable, row: TableRow, width: int) -> HistoryError:
+    """The error of a line of text with more or fewer cells than there are columns: those behind one are moved."""
+    delimiter = str(table.dialect).partition(",")[0]
+    advice = ", empty ones too" * (len(row.cells) < width)
+    advice += "; a decimal comma needs semicolons, or quotes, or write a point" * (table.dialect.delimiter == ",")
+    what = f"number of cells {len(row.cells)}, of columns {width}; write one cell a column"
+    return HistoryError(f"{table.location(row.line)}: {what}, separated by {delimiter}{advice}")
+
+
+def with_commas_of_remarks(table: CellTable, rows: Sequence[TableRow], names: Sequence[str]) -> list[TableRow]:
+    """The rows below names; of a text with commas none is longer, for a decimal comma moves what is behind it.
+
+    HistoryError for a longer row, unless its last column is of remarks, whose commas these are: a text begins there,
+    and no number stands before it in a column that has mostly none.
+    """
+    width, found = len(names), list[TableRow]()
+    if table.sheet or table.dialect.delimiter != "," or all(len(row.cells) <= width for row in rows):
+        return [*rows]
+    whole = [row.cells for row in rows if len(row.cells) == width]
+    numeric = [2 * sum(is_number(one[k], table.dialect) for one in whole) >= len(whole) for k in range(width)]
+    for row in rows:
+        before, remark = row.cells[: width - 1], row.cells[width - 1 :]
+        if len(remark) > 1 and any(remark[1:]):
+            is_moved = any(is_number(cell, table.dialect) and not numeric[k] for k, cell in enumerate(before))
+            is_text = bool(remark[0]) and not is_number(remark[0], table.dialect)
+            if kind_of_column(names[-1]) != "remark" or not (whole and is_text) or is_moved:
+                raise _another_width(table, row, width)
+            row = TableRow(row.line, [*before, ", ".join(filter(None, remark))])
+        found.append(row)
+    return found

@@ -19,7 +19,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.questions import ANSWERS_FILE
-from creepkit.readers.table import CellTable, SourceText, TableRow, without_ignored
+from creepkit.readers.table import CellTable, SourceText, TableRow, with_commas_of_remarks, without_ignored
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, split_written_name, unit_suffix, words_of
 from creepkit.records import known_specimens
 from creepkit.records.quantities import LENGTH
@@ -121,6 +121,11 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     known = vocabulary.terms(table.header["specimen"].text if "specimen" in table.header else "")
     at = _row_of_names(table, known)
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
+    rest = enumerate(table.rows[at + 1 :], at + 1)
+    first = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
+    widest = max((row.cells for row in table.rows[at:first]), key=len)
+    frames = with_commas_of_remarks(table, table.rows[first:], widest)
+    table = replace(table, rows=[*table.rows[:first], *frames])
     numbered = [name for k, name in enumerate(table.rows[at].cells) if _numbers_readings(table, at, k, known)]
     table = table.assuming(*(f"'{quoted(name, 40)}' numbers the readings" for name in numbered))
     table = without_ignored(_with_comments(table, line, known), at, (*vocabulary.ignored, *numbered))

@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import float_of, is_missing, is_number
+from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
@@ -91,13 +91,6 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
 
 
-_DAY, _OF_DAY = (
-    re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}(?: 00:00:00)?"),
-    re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?"),
-)
-"""A date, as of a spreadsheet too, and a time of the day."""
-
-
 def with_days(table: CellTable, known: Terms) -> CellTable:
     """The table with dates before the times of day beside them: without them readings of every day lie in one."""
     names = [words_of(name) for name in table.columns]
@@ -106,11 +99,13 @@ def with_days(table: CellTable, known: Terms) -> CellTable:
     if len(days) != 1 or len(clocks) != 1 or days == clocks:
         return table
     (day,), (clock,) = days, clocks
-    if not all(_DAY.fullmatch(row.cells[day]) and _OF_DAY.fullmatch(row.cells[clock]) for row in table.rows):
+    joined = [f"{row.cells[day].removesuffix(' 00:00:00')} {row.cells[clock]}" for row in table.rows]
+    if not all(is_clock_time(text) and not is_number(text.partition(" ")[0], Dialect()) for text in joined):
         return table
-    rows = [TableRow(row.line, [*row.cells]) for row in table.rows]
-    for row, joined in zip(table.rows, rows, strict=True):
-        joined.cells[clock] = f"{row.cells[day].partition(' ')[0]} {row.cells[clock]}"  # type: ignore[index]
+    rows = [
+        TableRow(row.line, [text if k == clock else cell for k, cell in enumerate(row.cells)])
+        for row, text in zip(table.rows, joined, strict=True)
+    ]
     columns = ["timestamp" if k == clock else name for k, name in enumerate(table.columns)]
     table = table.assuming(f"'{table.columns[day]}' and '{table.columns[clock]}' are one time")
     return replace(table, rows=rows, columns=columns).keeping([k for k in range(len(columns)) if k != day])
@@ -132,6 +127,7 @@ def without_clocks(table: CellTable, known: Terms) -> CellTable:
     return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
 
 
+_PART = re.compile(r"part(?:ie)?|teil|segment|run|lauf|section|abschnitt|phase", re.IGNORECASE)
 _GROUP = "test no"
 """Name of the column that numbers the tests of a table whose times begin anew."""
 
@@ -157,7 +153,13 @@ def with_names(table: CellTable, known: Terms) -> CellTable:
         ]
         for k in unknown if len(starts) > 2 else ():
             texts = [{row.cells[k] for row in table.rows[a:b]} - {""} for a, b in pairwise(starts)]
-            keys += [k] if {*map(len, texts)} == {1} and len(set.union(*texts)) == len(texts) else []
+            if {*map(len, texts)} == {1} and len(set.union(*texts)) == len(texts):
+                if _PART.fullmatch(name := table.columns[k]):
+                    what = (
+                        f"'{name}' numbers parts whose clock begins anew; are they tests of their own? If not, let the"
+                    )
+                    raise column_question(table, f"{what} time go on", {name: "test"})
+                keys.append(k)
     return replace(table, columns=[_GROUP if k in keys[:1] else one for k, one in enumerate(table.columns)])
 
 
@@ -561,7 +563,7 @@ def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
     """Whether frames of another test follow a row of text: a number that falls, or what is neither it nor a clock."""
     cells = before.cells[0], after.cells[0]
     known = [float_of(cell) for cell in cells if is_number(cell, table.dialect)]
-    return known[1] < known[0] if known[1:] else not all(_DAY.fullmatch(cell) or is_clock_time(cell) for cell in cells)
+    return known[1] < known[0] if known[1:] else not all(map(is_clock_time, cells))
 
 
 def _is_remark(row: TableRow, table: CellTable) -> bool:

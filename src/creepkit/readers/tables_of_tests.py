@@ -28,9 +28,16 @@ from creepkit.readers.columns_of_tests import (
     quantity_of,
     unit_of_times,
 )
-from creepkit.readers.ends_of_tests import LABEL, NO, YES, kind_of_column, plain_words
+from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
-from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width, without_ignored
+from creepkit.readers.table import (
+    CellTable,
+    SourceText,
+    TableRow,
+    cells_of_width,
+    with_commas_of_remarks,
+    without_ignored,
+)
 from creepkit.readers.table_heads import conditions_in_text, sources_of_names
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
@@ -114,8 +121,6 @@ class TestTable:
         if self.is_understood:
             self._fill_stated()
             self._fill_groups()
-            if vocabulary.ignored:
-                self._leave_out_silent_rows()
 
     @property
     def place(self) -> str:
@@ -139,6 +144,11 @@ class TestTable:
     def entry(self, row: TestRow, k: int) -> SourceText:
         """A cell of a row; of a number without separators between thousands, with a decimal point."""
         text, decimal = row.cells[k], self.table.dialect.decimal
+        if self.columns[k].kind is TIME and (match := TIME_IN_CELL.fullmatch(text)) and match["after"]:
+            unit = unit_suffix(match["after"].split(" ")[0].rstrip(".,;()"))
+            if unit in TIME.units and unit != self.columns[k].unit:
+                what = f"'{quoted(self.names[k], 60)}' is in {self.columns[k].unit}, and '{quoted(text)}' in {unit}"
+                raise HistoryError(f"{self.table.location(row.line)}: {what}; write it in {self.columns[k].unit}")
         if self.columns[k].kind or re.fullmatch(r"[+-]?\d*,\d+", text):
             text, decimal = plain_number(text, decimal)
         if self.columns[k].factor != 1.0 and is_number(text, Dialect(decimal=decimal)):
@@ -159,6 +169,7 @@ class TestTable:
         known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
         heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
         body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
+        body = with_commas_of_remarks(sheet, body, head.names)
         below = replace(sheet, rows=[TableRow(line, list(head.names)), *body])
         below = without_ignored(below, 0, self.vocabulary.ignored)
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
@@ -382,24 +393,6 @@ class TestTable:
         number = float(plain) if is_number(plain, Dialect()) else likely
         what = f"the cell of '{quoted(name, 60)}' is empty{others}; which {quantity} is it?"
         return self.question(what, f"{quantity}_{unit}", (number,), line=self.rows[missing[0]].line, is_free=True)
-
-    def _leave_out_silent_rows(self) -> None:
-        """Leave out rows that state no result once columns are left out, which its assumptions name."""
-        results = ("minimum_rate", "rupture", "end_time")
-        says = [k for k, one in enumerate(self.columns) if one.quantity in results or one.strain is not None]
-        silent = [all(is_missing(row.cells[k]) for k in says) for row in self.rows]
-        if silent and all(silent):
-            raise HistoryError(
-                f"{self.place}: no row states a minimum creep rate or an end of its test once the ignored columns are "
-                "left out; keep one of these columns"
-            )
-        names = zip(self.names_of_tests(), self.rows, silent, strict=True)
-        called = [name or f"line {row.line}" for name, row, is_silent in names if is_silent]
-        if called:
-            more = f" and {len(called) - MOST_ASKED} more" if len(called) > MOST_ASKED else ""
-            listed = f"{' '.join(called[:MOST_ASKED])}{more}"
-            self.table = self.table.assuming(f"without {listed} (nothing but ignored columns)")
-            self.rows = [row for row, is_silent in zip(self.rows, silent, strict=True) if not is_silent]
 
 
 _OF_TREATMENT = re.compile(

@@ -10,12 +10,14 @@
 
 A table holds for the files that its pattern matches, later ones over earlier ones. Its keys are conditions as they
 stand in the head of a file; `columns`, {name as written: what it is}; `ended`, a word for all tests, or {text, code or
-name of a test: ruptured, stopped or label}; `parts`, whether files that are parts of a test are joined or separate.
+name of a test: ruptured, stopped or label}; `parts`, whether files that are parts of a test are joined or separate;
+`decimal`, point or comma.
 """
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -36,6 +38,10 @@ ANSWERS = FileKind("answers about tests", HistoryError, "correct or remove it", 
 _ENDS = (RUPTURED, STOPPED, LABEL)
 
 
+DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": ","}
+"""What `decimal` may say, here or in the head of a file."""
+
+
 JOINED, SEPARATE = "joined", "separate"
 """What `parts` may say of files that are parts of one test."""
 
@@ -44,13 +50,14 @@ class Answers(NamedTuple):
     """What tests.toml says of one file.
 
     stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}. parts : whether
-    parts of a test are joined.
+    parts of a test are joined. decimal : the sign in numbers.
     """
 
     stated: dict[str, tuple[str, str]]
     columns: dict[str, str]
     ended: dict[str, str]
     parts: str = ""
+    decimal: str = ""
 
     def added_to(self, vocabulary: HeaderVocabulary) -> HeaderVocabulary:
         """The vocabulary of a reader with the answers."""
@@ -85,6 +92,8 @@ def answers_of(path: Path) -> Answers:
                     found.columns.update(value)
                 elif key == "parts":
                     found = found._replace(parts=value)
+                elif key == "decimal":
+                    found = found._replace(decimal=DECIMAL_SIGNS[value])
                 elif key == "ended" and isinstance(value, dict):
                     found.ended.update({text.casefold(): end for text, end in value.items()})
                 else:
@@ -121,6 +130,8 @@ def _problem(key: str, value: Any, known: Terms) -> str:
         return "" if is_table else 'write {name of a column = what it is}, such as {Dehnung = "strain_pct"}'
     if key == "parts":
         return "" if value in (JOINED, SEPARATE) else f"is {quoted(repr(value))}; allowed: {JOINED}, {SEPARATE}"
+    if key == "decimal":
+        return "" if value in DECIMAL_SIGNS else f"is {quoted(repr(value))}; allowed: point, comma"
     if key == "ended":
         values = list(value.values()) if isinstance(value, dict) else [value]
         wrong = [one for one in values if one not in (_ENDS if isinstance(value, dict) else _ENDS[:2])]

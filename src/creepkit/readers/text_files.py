@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
@@ -25,20 +25,19 @@ from creepkit.readers.table import (
     CellTable,
     SourceText,
     TableRow,
+    dialect_of,
     entry_of,
     is_comment,
     named_columns,
     refuse_long_cells,
     without_ignored,
     without_logarithms,
+    without_thousands,
 )
+from creepkit.readers.tests_file import DECIMAL_SIGNS, answers_of
 from creepkit.readers.vocabulary import plain_name, unit_suffix
 
 TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
-
-
-DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": ","}
-"""What `# decimal:` may say."""
 
 
 _BEGINNING = 65_536
@@ -56,7 +55,7 @@ def read_table(path: Path, ignored: Collection[str] = ()) -> CellTable:
 
 def read_text_table(path: Path) -> CellTable:
     """Read a text table of any delimiter, decimal sign and encoding; HistoryError where it holds no table."""
-    return table_of_text(path, decode_text(read_bytes(path, TABLE_FILE), path))
+    return table_of_text(path, decode_text(read_bytes(path, TABLE_FILE), path), answers_of(path).decimal)
 
 
 def peek_table(path: Path) -> CellTable | None:
@@ -85,7 +84,7 @@ def read_head_alone(path: Path) -> dict[str, SourceText]:
     return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
 
 
-def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTable:
+def table_of_text(path: Path, text: str, decimal: str = "") -> CellTable:
     """The table of a text; path : whence it came. decimal : its sign, where it does not matter or is known."""
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -97,7 +96,7 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
         raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain_pct, then rows")
     comments, first = list[tuple[int, str]](), len(head) + 1
     decimal = decimal or _stated_decimal(path, head)
-    dialect = detect_dialect((line for _, line in _numbered(text, offset, first)), str(path), decimal)
+    dialect = dialect_of((line for _, line in _numbered(text, offset, first)), path, str(path), decimal)
     rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
     if not rows:
         raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
@@ -113,7 +112,7 @@ def table_of_text(path: Path, text: str, decimal: str | None = None) -> CellTabl
             if colon
         ],
     )
-    return without_logarithms(table)
+    return without_logarithms(without_thousands(table, is_stated=bool(decimal)))
 
 
 def _numbered(
@@ -221,7 +220,7 @@ def _names_behind_mark(line: str, count: int, dialect: Dialect) -> list[str]:
     return []
 
 
-def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:
+def _stated_decimal(path: Path, head: Sequence[str]) -> str:
     """The decimal sign that `# decimal:` states in a head."""
     for number, line in enumerate(head, 1):
         key, colon, text = entry_of(line)
@@ -230,7 +229,7 @@ def _stated_decimal(path: Path, head: Sequence[str]) -> str | None:
             if sign not in DECIMAL_SIGNS:
                 raise HistoryError(f"{path}:{number}: decimal is '{quoted(text)}'; allowed: point, comma")
             return DECIMAL_SIGNS[sign]
-    return None
+    return ""
 
 
 def _head_entries(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dialect) -> dict[str, SourceText]:

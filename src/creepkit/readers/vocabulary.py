@@ -88,7 +88,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "elongation": (
         *("extension", "extn", "ext", "creep extension", "extensometer", "gauge extension", "axial extension"),
         *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
-        *("längenänderung", "verlängerung", "allongement"),
+        *("längenänderung", "verlängerung", "allongement", "height change", "change in height", "shortening"),
+        *("stauchung", "höhenänderung", "raccourcissement", "variation de hauteur"),
     ),
     "modulus": (
         *("young's modulus", "youngs modulus", "elastic modulus", "modulus of elasticity", "e modulus", "e modul"),
@@ -116,6 +117,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
         *("anfangsmesslänge", "anfangsmesslänge le", "anfangsmesslänge l0", "messbasis", "longueur utile"),
         *("longueur de base", "longueur de référence", "longueur entre repères"),
+    ),
+    "height": (
+        *("specimen height", "sample height", "initial height", "original height", "höhe", "probenhöhe", "hauteur"),
+        *("anfangshöhe", "ausgangshöhe", "hauteur initiale", "hauteur éprouvette"),
     ),
     "outer_diameter": (
         *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
@@ -145,6 +150,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "area": (
         *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
         *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
+    ),
+    "specimen": (
+        *("specimen type", "specimen form", "specimen shape", "specimen geometry", "type of specimen", "probenform"),
+        *("probentyp", "probengeometrie", "type d'éprouvette", "forme d'éprouvette"),
     ),
     "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
     "name": ("test name", "test id", "test", "試験片番号"),
@@ -176,6 +185,7 @@ SYMBOLS: Mapping[str, str] = {
     **dict.fromkeys(("ΔD", "Δd", "dD"), "diameter_growth"),
     **dict.fromkeys(("L0", "l0", "Lo", "Le", "Lr0"), "gauge_length"),
     **dict.fromkeys(("S0", "A0", "So", "Ao"), "area"),
+    **dict.fromkeys(("h0", "H0", "h₀", "H₀"), "height"),
 }
 """{symbol: quantity}; capitals matter."""
 
@@ -197,7 +207,11 @@ _PARTS_OF_UNIT = 8
 """Into which a unit may be divided by a separator, as `mm / mm` is."""
 
 
-_RATE_UNIT = re.compile(r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+|(?:1000|10\^?3|10³) ?h)(\^?-1)?")
+_RATE_UNIT = re.compile(
+    r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+|(?:1000|10\^?3) ?h)(\^?[({]?-1[)}]?)?"
+)
+_ON_THE_LINE = str.maketrans("⁻⁰¹²³⁶·*", "-01236  ")
+"""Exponents and products in a unit as they are typed."""
 
 
 @lru_cache(maxsize=4096)
@@ -207,10 +221,10 @@ def unit_suffix(text: str) -> str | None:
     if text in CAPITALS_THAT_MATTER:
         return None
     plain = text.lower()
-    rate = _RATE_UNIT.fullmatch(plain)
+    rate = _RATE_UNIT.fullmatch(plain.translate(_ON_THE_LINE))
     if (
         rate
-        and (rate[4] or rate[2] == "per " or (rate[1] and rate[2]))
+        and ((rate[4] and not rate[2]) or rate[2] == "per " or (rate[1] and rate[2]))
         and (time := UNIT_SPELLINGS.get(rate[3])) in TIME.units
     ):
         return f"{'pct' if UNIT_SPELLINGS.get(rate[1]) == 'pct' else '1'}/{time}"
@@ -227,7 +241,7 @@ def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix
     if match := _IN_BRACKETS.fullmatch(text):
         name, unit, rest = (part.strip() for part in match.groups())
         if not rest or is_unit(unit):
-            return f"{name} {rest}".strip(), unit
+            return f"{name} {rest}".strip(" /"), unit
     for separator in (",", " in ", "_", " ", "/"):
         parts = text.split(separator)
         for k in range(max(1, len(parts) - _PARTS_OF_UNIT), len(parts)):

@@ -22,6 +22,10 @@ LARGEST_NOISE = 10.0
 makes no breakpoints."""
 
 
+FAULT = 20.0
+"""Standard deviations off the median of its neighbours beyond which a reading is a fault of the sensor."""
+
+
 SURE_DRIFT = 0.01
 """Probability of a slope by noise alone below which a record that is a line drifts; above, it is held."""
 
@@ -45,10 +49,12 @@ def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program
     followed = running_median(values) if noisy else values
     kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
     at_breakpoints: Floats = values[kept]
+    off = np.abs(values - followed)
+    sound = np.where(off > max(tolerance, FAULT * 1.4826 * float(np.median(off))), followed, values)
     if noisy and kept.size == 2 and not _drifts(times, values):
-        at_breakpoints = np.full(2, values.mean())
+        at_breakpoints = np.full(2, sound.mean())
     elif noisy:
-        at_breakpoints = _least_squares(times, values, kept)
+        at_breakpoints = _least_squares(times, sound, kept)
     if times[0] == 0.0:
         return Program(times[kept], at_breakpoints)
     return Program(np.append(0.0, times[kept]), np.append(at_breakpoints[0], at_breakpoints))

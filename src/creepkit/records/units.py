@@ -93,7 +93,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
             offset=ZERO_CELSIUS - 32.0 / 1.8,
         ),
         "1": _unit("strain", 1.0, "-", "mm/mm", "m/m", "in/in", "in./in.", "fraction"),
-        "pct": _unit("strain", 1e-2, "%", "percent", "per cent"),
+        "pct": _unit("strain", 1e-2, "%", "percent", "per cent", "1e-2", "10^-2", "10-2", "10⁻²"),
         "permille": _unit("strain", 1e-3, "‰", "per mille", "promille", "mm/m", "1e-3", "10^-3", "10-3", "10⁻³"),
         "microstrain": _unit(
             *("strain", 1e-6, "µstrain", "μstrain", "ustrain", "µm/m", "μm/m", "um/m", "mikrodehnung"),

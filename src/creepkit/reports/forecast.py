@@ -14,7 +14,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.forecasts.banded_output import CHOICE_OF_LAW, LAW
 from creepkit.forecasts.draws import MISFIT_THERE
-from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure

@@ -202,14 +202,15 @@ def test_the_record_of_dimple_d1() -> None:
 
 def test_units_that_are_nearly_known_are_not_taken_in_silence(tmp_path: Path) -> None:
     for head in ("P_mPa", "P [mPa]", "P mPag"):
-        with pytest.raises(HistoryError, match=r"is no unit; write MPag? into the head if that is meant"):
+        with pytest.raises(
+            HistoryError, match=r"is MPag? in other capitals; write MPag? into the head if that is meant"
+        ):
             ck.read_record(written(tmp_path, f"time_s,{head}\n0,1\n1,2\n2,3\n".encode()))
     table = b"time_s,T_c,p [psgi],valve,V (rpm),T_set,p_in_mbar\n" + b"".join(b"%d,1,2,3,4,5,6\n" % k for k in range(4))
     record = ck.read_record(written(tmp_path, table))
     assert [channel.quantity for channel in record.channels.values()] == [*["number"] * 5, "pressure"]
     text = str(record)
-    assert "T_c: taken for numbers without a unit; if 'c' means C, write C into the head" in text
-    assert "p: taken for numbers without a unit; if 'psgi' means psi, write psi into the head" in text
+    assert "p: numbers in 'psgi', which is not converted" in text
     assert "V: numbers in 'rpm', which is not converted" in text
     assert not any(note.startswith(("valve", "T_set")) for note in record.notes)
 

@@ -24,6 +24,15 @@ def test_a_compressed_piece_has_logarithmic_strains_and_its_true_stress(tmp_path
     assert one.labels["assumed"].startswith("compression")
 
 
+@pytest.mark.parametrize("height", ["Specimen height;12;mm", "Probenhöhe (mm);12", "Hauteur initiale;12;mm"])
+def test_the_height_of_a_compressed_piece_is_its_gauge_length(tmp_path, height):
+    head = f"Compression creep;P1\n{height}\nDiameter;8;mm\nTemperature;950;°C\nTime (h);Load (N);"
+    (tmp_path / "a.csv").write_text(head + "Height change (µm)\n0;4000;0\n10;4000;-60\n20;4000;-120\n", "utf-8")
+    (one,) = ck.read_histories(tmp_path / "a.csv")
+    np.testing.assert_allclose(one.outputs["strain"], -np.log1p([0.0, -0.005, -0.01]), atol=1e-12)
+    assert one.geometry == {"gauge_length": 12.0, "diameter": 8.0}
+
+
 @pytest.mark.parametrize("label", ["part: compressor disc", "rig: tension-compression", "Maschine: Zug-Druck"])
 def test_a_bar_of_a_compressor_or_of_a_rig_for_both_is_in_tension(tmp_path, label):
     (tmp_path / "a.csv").write_text(

@@ -107,13 +107,29 @@ SENTENCES = {
         *("Failure: no", "Bruch: nein", "Rupture: N/A", "Bruch: -", "n. gebr.", "o. Bruch", "failure-free"),
         *("1000 h without rupture", "n’a toujours pas cassé", "kein Versagen bis 5000 h", "failed to rupture"),
         *("Versagen noch nicht eingetreten", "aucune rupture constatée", "specimen was not broken when the test ended"),
+        *(
+            "failure did not occur",
+            "nicht bis zum Bruch gefahren",
+            "la rupture n'a pas été atteinte",
+            "Bruch trat nicht ein",
+        ),
     ),
     "unclear": (
         *("furnace failure at 3000 h", "before it could break", "no sign of failure", "broke during unloading"),
         *("failure criterion not met", "rupture lors du démontage", "test broken off", "Bruch steht noch aus"),
-        *("failed in grips", "rupture expected in May", "ruptured?"),
+        *("failed in grips", "rupture expected in May", "ruptured?", "failed (grip slipped), not counted"),
+        *(
+            "failure of the load cell at 77 h",
+            "Probe nach Versuchsende zerbrochen",
+            "rupture du joint",
+            "broken by hand",
+        ),
+        *("last reading before fracture", "Bruch des Gestänges"),
     ),
-    "ruptured": ("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "gerissen", "premature failure"),
+    "ruptured": (
+        *("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "gerissen", "premature failure"),
+        *("not interrupted, ran to rupture", "Bruch der Probe", "rupture de l'éprouvette", "broke near the fillet"),
+    ),
     "": ("necking", "heat X7", "thermocouple replaced", "Probe hält noch", "creep of a disc 8 mm dia"),
 }
 

@@ -317,8 +317,8 @@ def test_words_of_tables_are_words_of_heads_and_an_end_has_its_time(tmp_path):
     (test,) = _read(tmp_path, head + "Stress (MPa);260\nZeit (h);Dehnung (%)\n0;0\n100;0,5\n386,5;11\n")
     assert test.rupture_time == pytest.approx(388.4 * 3600)
     assert (test.labels["elongation_pct"], test.labels["heat"]) == ("22", "X7")
-    with pytest.raises(HistoryError, match=r"'rate \(%/h\)' is a rate .*; is it a minimum creep rate"):
-        _read(tmp_path, "stress (MPa),T (C),rate (%/h)\n80,550,6e-05\n100,550,2e-04\n")
+    with pytest.raises(HistoryError, match=r"'strain rate \(%/h\)' is a rate .*; is it a minimum creep"):
+        _read(tmp_path, "stress (MPa),T (C),strain rate (%/h)\n80,550,6e-05\n100,550,2e-04\n")
 
 
 # ---- tables of laboratories ------------------------------------------------------------------------------------------

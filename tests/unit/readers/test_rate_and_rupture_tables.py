@@ -105,6 +105,38 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+LONGER = [
+    "rupture_h,heat\nA1,120,750,8200,5,X7\nA2,100,750,12500,X8",
+    "rupture_h,grain size\nA1,120,750,8200,5,40\nA2,100,750,12500,41",
+    "rupture_h,heat,remark\nA1,120,750,8200,5,X7,broke\nA2,100,750,12500,X8,broke",
+    "rupture_h\nA1,120,750,8200,5\nA2,100,750,12500",
+]
+
+
+@pytest.mark.parametrize("rows", LONGER)
+def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path, rows):
+    """8200,5 h without quotes takes two cells, and had been read as 8200 h; commas of a last remark are its own."""
+    with pytest.raises(HistoryError, match=r"table.csv:2: number of cells \d, of columns \d; .* decimal comma"):
+        read(tmp_path, f"test,stress_MPa,temperature_C,{rows}\n")
+    text = "test,stress_MPa,temperature_C,rupture_h,remark\nA1,120,750,8200,broke, necked\nA2,100,750,9000,broke\n"
+    assert read(tmp_path, text)[0].labels["remark"] == "broke, necked"
+
+
+def test_commas_between_thousands(tmp_path):
+    text = "test;stress (MPa);T (C);t_r (h)\nA;120.5;750;21,251\nB;140;750;>3,101\nC;160;750;911\n"
+    assert [one.times[-1] / 3600 for one in read(tmp_path, text)] == [21251.0, 3101.0, 911.0]
+    with pytest.raises(HistoryError, match=r"table.csv:2: '21,251' may be 21.251 or 21251; write into tests.toml"):
+        read(tmp_path, text.replace(">3,101", "3101"))
+    doubtful = text.replace("120.5", "120")
+    with pytest.raises(
+        HistoryError, match=r"may be 21.251 or 21251; .* decimal = \"comma\" \(or decimal = \"point\"\)"
+    ):
+        read(tmp_path, doubtful)
+    for answer, hours in (("comma", 21.251), ("point", 21251.0)):
+        (tmp_path / "tests.toml").write_text(f'["table.csv"]\ndecimal = "{answer}"\n')
+        assert read(tmp_path, doubtful)[0].times[-1] == pytest.approx(3600 * hours)
+
+
 def test_ends_that_contradict_one_another(tmp_path):
     head = "stress_MPa,temperature_C,t_r_h,ended\n"
     for end, said in (
@@ -156,23 +188,6 @@ def test_a_column_of_specimens_names_the_tests(tmp_path):
     assert [h.name for h in ck.read_histories(path)] == ["P1", "P2"]
 
 
-def test_rows_that_state_nothing_but_ignored_columns_are_left_out(tmp_path):
-    text = "test,stress_MPa,T (C),minimum_rate_1/h,t_r (h)\nA,100,700,1e-6,1000\nB,80,700,,5000\nC,90,700,,>9000\n"
-    path = tmp_path / "table.csv"
-    path.write_text(text)
-    assert [h.name for h in ck.read_histories(path)] == ["A", "B", "C"]
-    (rate,) = ck.read_histories(path, ignore=["t_r (h)"])
-    assert (rate.name, rate.end_known) == ("A", False)
-    assert "without B C (nothing but ignored columns)" in rate.labels["assumed"]
-    ends = ck.read_histories(path, ignore=["minimum_rate_1/h"])
-    assert [h.minimum_rate for h in ends] == [None] * 3
-    with pytest.raises(HistoryError, match="no row states a minimum creep rate or an end of its test once the ignored"):
-        ck.read_histories(path, ignore=["minimum_rate_1/h", "t_r (h)"])
-    path.write_text(text.replace(",,5000", ",,"))
-    with pytest.raises(HistoryError, match="no minimum creep rate and no end"):
-        ck.read_histories(path)
-
-
 @pytest.mark.parametrize(
     "known",
     [
@@ -195,42 +210,3 @@ def test_a_test_without_frames_reads_back(tmp_path, known):
 def test_a_rate_beside_frames_reads_back(tmp_path):
     test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
     assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
-
-
-def test_a_matrix_of_rupture_times_is_one_test_a_cell(tmp_path):
-    """Temperatures by stresses as data sheets print them, in three languages, as text and in sheets of two heats."""
-    rows = ["550;20.3;132.3;(60000)", "600;-;11.9;>32.4"]
-    heads = (
-        "Creep rupture data, heat B7 (h);;;\nTemperature (C);235 MPa;196 MPa;177 MPa",
-        "Rupture time in h, heat B7;;;\nT (°C) \\ Stress (MPa);235;196;177",
-        "Bruchzeit in h, Charge B7;;;\nTemperatur [°C];Spannung [MPa];;\n;235;196;177",
-        "Temps de rupture (h), coulée B7;;;\nTempérature (°C) / contrainte (MPa);235;196;177",
-    )
-    expected = [(550, 235, 20.3, None), (550, 196, 132.3, None), (550, 177, None, 6e4), (600, 196, 11.9, None)]
-    expected += [(600, 177, None, 32.4)]
-
-    for head in heads:
-        tests = read(tmp_path, "\n".join([head, *rows]) + "\n")
-        for test, (celsius, stress, broke, lasted) in zip(tests, expected, strict=True):
-            found = (test.temperature - 273.15, test.loading.steps[0][1], test.times[-1] / 3600.0)
-            assert found == pytest.approx((celsius, stress, broke or lasted)), head
-            assert (test.rupture_time is None) == test.unruptured == (broke is None), head
-            assert test.labels["heat"] == "B7", head
-    sheets = {
-        f"Heat {heat}": [
-            [f"Creep rupture data, Heat {heat}"],
-            ["Test temp. (°C)", "Time to rupture (h) at stress (MPa) of"],
-            [None, 235, 196, 177],
-            [550, 20.3, 132.3, "(60000)"],
-            [600, "-", 11.9, 32.4],
-            ["( ): test in progress, not ruptured.  - : not tested"],
-        ]
-        for heat in ("AAA", "AAB")
-    }
-    tests = ck.read_histories(workbook(tmp_path / "matrix.xlsx", sheets))
-    assert [one.labels["heat"] for one in tests] == ["AAA"] * 5 + ["AAB"] * 5
-    assert [one.unruptured for one in tests] == [False, False, True, False, False] * 2
-    with pytest.raises(HistoryError, match=r"'Rupture time' has no unit.*\"rupture_h\""):
-        read(tmp_path, "Zeitstandfestigkeit;;;\nTemperatur (C);235 MPa;196 MPa;177 MPa\n" + "\n".join(rows) + "\n")
-    (tmp_path / "tests.toml").write_text('["*.csv"]\ncolumns = {"Rupture time" = "rupture_h"}\n')
-    assert len(ck.read_histories(tmp_path / "table.csv")) == 5
