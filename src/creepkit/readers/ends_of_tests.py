@@ -213,7 +213,7 @@ _REMARK_WORDS = _words(
 )
 _OTHER_USES = _words(
     r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
-    r"position|lage|mode|type|typ|ort|appearance|allongement",
+    r"position|lage|mode|type|typ|ort|appearance|allongement|rate|(?:kriech)?(?:rate|geschwindigkeit)|vitesse",
 )
 """Words beside one of rupture that make the name of a column that of a quantity or a description."""
 

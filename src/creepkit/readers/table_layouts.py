@@ -538,9 +538,14 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
 def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
     """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
+    begins_with_text = [row.cells[0][:1].isalpha() and not is_missing(row.cells[0]) for row in table.rows]
+    is_numbered = any(is_number(row.cells[0], table.dialect) for row in table.rows[1:2])
+    last = next((k for k, is_text in reversed([*enumerate(begins_with_text)]) if not is_text), 0)
+    is_footer = [is_numbered and k > last for k in range(len(table.rows))]  # "Mean | 0.3"
     for k, row in enumerate(table.rows):
         after = table.rows[k + 1 : k + 2]
-        if k < 2 or not _is_remark(row, table) or any(_begins_again(table.rows[k - 1], one, table) for one in after):
+        is_remark = _is_remark(row, table) and not any(_begins_again(table.rows[k - 1], one, table) for one in after)
+        if k < 2 or not (is_remark or is_footer[k]):
             frames.append(row)
             continue
         text = " ".join(filter(None, row.cells))
