@@ -121,8 +121,8 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     known = vocabulary.terms(table.header["specimen"].text if "specimen" in table.header else "")
     at = _row_of_names(table, known)
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
-    below = enumerate(table.rows[at + 1 :], at + 1)
-    first = next((k for k, row in below if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
+    rest = enumerate(table.rows[at + 1 :], at + 1)
+    first = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
     widest = max((row.cells for row in table.rows[at:first]), key=len)
     frames = with_commas_of_remarks(table, table.rows[first:], widest)
     table = replace(table, rows=[*table.rows[:first], *frames])

@@ -76,13 +76,8 @@ def test_units_behind_a_stroke_as_din_1313_and_iupac_write_them(read, head):
     rate = -5.0 if head.startswith("log") else 1e-5
     tests = read(f"No.;T/°C;sigma/MPa;{head}\n1;600;80;{rate}\n2;600;90;{rate}\n")
     assert [one.minimum_rate for one in tests] == [pytest.approx(1e-5 / 3600)] * 2
-
-
-@pytest.mark.parametrize(("head", "scale"), [("strain/10^-2", 1e-2), ("ε / 10⁻³", 1e-3), ("Dehnung/(%)", 1e-2)])
-def test_strains_and_times_behind_a_stroke(read, head, scale):
-    (test,) = read(f"Creep at 600 °C and 80 MPa\nt/(h);{head}\n0;0\n1;0.5\n2;0.75\n")
-    np.testing.assert_allclose(test.outputs["strain"], scale * np.array([0.0, 0.5, 0.75]))
-    assert test.times[-1] == 7200.0
+    (test,) = read("Creep at 600 °C and 80 MPa\nt/(h);ε / 10⁻²\n0;0\n1;0.5\n2;0.75\n")
+    np.testing.assert_allclose(test.outputs["strain"], [0.0, 0.005, 0.0075])
 
 
 def test_blocks_below_one_another(read):
@@ -263,3 +258,64 @@ def test_what_is_not_there_and_what_is_no_record_are_told(tmp_path):
     assert "no such file or folder" in creepkit("read", tmp_path / "no.csv").output
     (tmp_path / "d.csv").write_text("Date,Time,Hours,Strain % x 10^-3\n12/01/1998,09:30,0,0\n13/01/1998,09:30,24,64\n")
     assert creepkit("read", tmp_path / "d.csv").exit_code == 1
+
+
+C, MPA, STRAIN = "Temperature;550;°C\n", "Stress;140;MPa\n", "Time (h);Strain (%)\n"
+BAR = C + "Diameter;8;mm\nGauge length;50;mm\n"
+RAMP = "Time (s);Stress (MPa);Strain (%)\n0;0;0\n10;28;0,017\n20;56;0,034\n30;84;0,051\n40;112;0,069\n50;140;0,1\n"
+FEW = f"E;170;GPa\n{MPA}{STRAIN}0;0,085\n24;0,12\n100;0,2\n250;0,32\n500;0,5\n1000;0,85\n2000;1,6\n"
+TOTAL = f"{MPA}E;170;GPa\nLoading strain (%);0,1\nTime (h);Total strain (%)\n0;0,1\n1;0,13\n10;0,28\n100;1,3\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "last", "is_elastic"),
+    [
+        (FEW, 0.00085, 0.016, True),
+        (RAMP + "60;140;0,11\n3600;140;0,15\n36000;140;0,3\n360000;140;1\n", -0.001, 0.009, False),
+        (f"{MPA}{STRAIN}0;-0,3\n1;-0,25\n10;-0,1\n100;0,6\n", 0.0, 0.009, False),  # a transducer that was not zeroed
+        (f"{MPA}{STRAIN}0;0\n0;0,08\n1;0,13\n10;0,28\n100;0,98\n", 0.0008, 0.0098, False),  # before and after loading
+        (TOTAL, 0.0, 0.012, False),
+    ],
+)
+def test_what_of_a_strain_is_creep(read, text, first, last, is_elastic):
+    (test,) = read(C + text)
+    strain = test.outputs["strain"]
+    assert (test.includes_elastic, strain[0], strain[-1]) == pytest.approx((is_elastic, first, last))
+
+
+ASKED = {
+    "Test;Stress (MPa);T (C);Rupture time (h)\nA;140;550;800\nB;120;550;120 d\n": "is in h, and '120 d' in d",
+    f"{BAR}Load;7037;N\nStress;120;MPa\nTime (h);Extension (mm)\n0;0\n1;0,05\n": r"makes 140 MPa .* says 120 MPa",
+    f"{BAR}Load;12;kg\nLever ratio;10\nTime (h);Extension (mm)\n0;0\n1;0,05\n": "'Lever ratio' leaves open whether",
+    f"{BAR}Compliance;0,02\nTime (h);Load (N);Extension (mm)\n0;70;0\n1;70;0,2\n": "'Compliance' leaves open whether",
+    "Test;Stress (MPa);T (C);t_r (h);Specimen\nA;140;550;800;smooth\nB;140;550;900;notched Kt=3\n": "'notched Kt=3'",
+    f"{C}{MPA}Test type;constant stress\n{STRAIN}0;0\n9;0,2\n": "true stress held, or the load",
+    f"{C}{MPA}Part;{STRAIN}1;0;0\n1;9;0,2\n2;0;0,2\n2;9;0,3\n": "'Part' numbers parts whose clock begins anew",
+}
+
+
+@pytest.mark.parametrize("text", ASKED)
+def test_what_a_file_leaves_open_is_asked(read, text):
+    with pytest.raises(HistoryError, match=ASKED[text]):
+        read(text)
+
+
+CLOCKS = {"(dd:hh:mm)": ("0:00:00", "4:04:00", 100), "(hh:mm)": ("00:30", "100:30", 100), "(s)": (17e8, 17e8 + 3600, 1)}
+
+
+@pytest.mark.parametrize("unit", CLOCKS)
+def test_times_of_clocks_and_calendars(read, unit):
+    start, end, hours = CLOCKS[unit]
+    (test,) = read(f"{MPA}{C}Time {unit};Strain (%)\n{start};0\n{end};0.1\n")
+    assert test.times[-1] - test.times[0] == pytest.approx(3600.0 * hours)
+
+
+def test_lost_readings_pauses_and_extrapolated_points(read):
+    rows = "".join(f"{10 * k};{k / 60};{550.3 - 0.5 * (k % 2) if k != 17 else 0}\n" for k in range(60))
+    (test,) = read(f"{MPA}Time (h);Strain (%);Temperature (°C)\n{rows}")
+    assert test.mean_temperature == pytest.approx(823.2, abs=0.1)
+    pause = "0;140;0\n1;140;0.05\n10;140;0.2\n10;0;0.11\n20;0;0.1\n20;140;0.19\n30;140;0.3\n100;140;0.9\n"
+    (test,) = read(f"{C}Time (h);Stress (MPa);Strain (%)\n{pause}")
+    assert test.loading.steps == ((0.0, 140.0), (36000.0, 0.0), (72000.0, 140.0))
+    (test,) = read(f"{C}{MPA}Time (h);Strain (%);Remark\n0;0;\n9;0.2;\n99;0.9;\n999;4;extrapolated\n")
+    assert test.used.tolist() == [True, True, True, False]

@@ -105,38 +105,28 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-LONGER = {
-    "a decimal comma before a column of words": ("rupture_h,heat", "8200,5,X7", "12500,X8"),
-    "before a column of numbers": ("rupture_h,grain size", "8200,5,40", "12500,41"),
-    "before a remark": ("rupture_h,remark", "8200,5,broke", "12500,broke"),
-    "before a heat and a remark": ("rupture_h,heat,remark", "8200,5,X7,broke", "12500,X8,broke"),
-    "in the last column": ("rupture_h", "8200,5", "12500"),
-}
+LONGER = [
+    "rupture_h,heat\nA1,120,750,8200,5,X7\nA2,100,750,12500,X8",
+    "rupture_h,grain size\nA1,120,750,8200,5,40\nA2,100,750,12500,41",
+    "rupture_h,heat,remark\nA1,120,750,8200,5,X7,broke\nA2,100,750,12500,X8,broke",
+    "rupture_h\nA1,120,750,8200,5\nA2,100,750,12500",
+]
 
 
-@pytest.mark.parametrize("case", LONGER)
-def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path, case):
-    """8200,5 h without quotes takes two cells, and had been read as 8200 h."""
-    head, longer, row = LONGER[case]
+@pytest.mark.parametrize("rows", LONGER)
+def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path, rows):
+    """8200,5 h without quotes takes two cells, and had been read as 8200 h; commas of a last remark are its own."""
     with pytest.raises(HistoryError, match=r"table.csv:2: number of cells \d, of columns \d; .* decimal comma"):
-        read(tmp_path, f"test,stress_MPa,temperature_C,{head}\nA1,120,750,{longer}\nA2,100,750,{row}\n")
-
-
-def test_commas_of_a_remark_in_the_last_column_are_its_own(tmp_path):
+        read(tmp_path, f"test,stress_MPa,temperature_C,{rows}\n")
     text = "test,stress_MPa,temperature_C,rupture_h,remark\nA1,120,750,8200,broke, necked\nA2,100,750,9000,broke\n"
     assert read(tmp_path, text)[0].labels["remark"] == "broke, necked"
-    with pytest.raises(HistoryError, match="table.csv:4: number of cells 4, of columns 3"):
-        read(tmp_path, "time (h),strain (%),remark\n0,0,start\n1,0.1,\n2,5,0.2,ok\n3,0.3,\n")
 
 
 def test_commas_between_thousands(tmp_path):
     text = "test;stress (MPa);T (C);t_r (h)\nA;120.5;750;21,251\nB;140;750;>3,101\nC;160;750;911\n"
-    tests = read(tmp_path, text)
-    assert [one.times[-1] / 3600 for one in tests] == [21251.0, 3101.0, 911.0]
-    assert "commas stand between thousands (21251)" in tests[0].labels["assumed"]
-    single = text.replace(">3,101", "3101")
+    assert [one.times[-1] / 3600 for one in read(tmp_path, text)] == [21251.0, 3101.0, 911.0]
     with pytest.raises(HistoryError, match=r"table.csv:2: '21,251' may be 21.251 or 21251; write into tests.toml"):
-        read(tmp_path, single)
+        read(tmp_path, text.replace(">3,101", "3101"))
     doubtful = text.replace("120.5", "120")
     with pytest.raises(
         HistoryError, match=r"may be 21.251 or 21251; .* decimal = \"comma\" \(or decimal = \"point\"\)"
@@ -145,7 +135,6 @@ def test_commas_between_thousands(tmp_path):
     for answer, hours in (("comma", 21.251), ("point", 21251.0)):
         (tmp_path / "tests.toml").write_text(f'["table.csv"]\ndecimal = "{answer}"\n')
         assert read(tmp_path, doubtful)[0].times[-1] == pytest.approx(3600 * hours)
-    assert read(tmp_path, single)[0].times[-1] == 21251.0 * 3600
 
 
 def test_ends_that_contradict_one_another(tmp_path):
@@ -221,42 +210,3 @@ def test_a_test_without_frames_reads_back(tmp_path, known):
 def test_a_rate_beside_frames_reads_back(tmp_path):
     test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
     assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
-
-
-def test_a_matrix_of_rupture_times_is_one_test_a_cell(tmp_path):
-    """Temperatures by stresses as data sheets print them, in three languages, as text and in sheets of two heats."""
-    rows = ["550;20.3;132.3;(60000)", "600;-;11.9;>32.4"]
-    heads = (
-        "Creep rupture data, heat B7 (h);;;\nTemperature (C);235 MPa;196 MPa;177 MPa",
-        "Rupture time in h, heat B7;;;\nT (°C) \\ Stress (MPa);235;196;177",
-        "Bruchzeit in h, Charge B7;;;\nTemperatur [°C];Spannung [MPa];;\n;235;196;177",
-        "Temps de rupture (h), coulée B7;;;\nTempérature (°C) / contrainte (MPa);235;196;177",
-    )
-    expected = [(550, 235, 20.3, None), (550, 196, 132.3, None), (550, 177, None, 6e4), (600, 196, 11.9, None)]
-    expected += [(600, 177, None, 32.4)]
-
-    for head in heads:
-        tests = read(tmp_path, "\n".join([head, *rows]) + "\n")
-        for test, (celsius, stress, broke, lasted) in zip(tests, expected, strict=True):
-            found = (test.temperature - 273.15, test.loading.steps[0][1], test.times[-1] / 3600.0)
-            assert found == pytest.approx((celsius, stress, broke or lasted)), head
-            assert (test.rupture_time is None) == test.unruptured == (broke is None), head
-            assert test.labels["heat"] == "B7", head
-    sheets = {
-        f"Heat {heat}": [
-            [f"Creep rupture data, Heat {heat}"],
-            ["Test temp. (°C)", "Time to rupture (h) at stress (MPa) of"],
-            [None, 235, 196, 177],
-            [550, 20.3, 132.3, "(60000)"],
-            [600, "-", 11.9, 32.4],
-            ["( ): test in progress, not ruptured.  - : not tested"],
-        ]
-        for heat in ("AAA", "AAB")
-    }
-    tests = ck.read_histories(workbook(tmp_path / "matrix.xlsx", sheets))
-    assert [one.labels["heat"] for one in tests] == ["AAA"] * 5 + ["AAB"] * 5
-    assert [one.unruptured for one in tests] == [False, False, True, False, False] * 2
-    with pytest.raises(HistoryError, match=r"'Rupture time' has no unit.*\"rupture_h\""):
-        read(tmp_path, "Zeitstandfestigkeit;;;\nTemperatur (C);235 MPa;196 MPa;177 MPa\n" + "\n".join(rows) + "\n")
-    (tmp_path / "tests.toml").write_text('["*.csv"]\ncolumns = {"Rupture time" = "rupture_h"}\n')
-    assert len(ck.read_histories(tmp_path / "table.csv")) == 5
