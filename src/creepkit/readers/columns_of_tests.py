@@ -108,13 +108,10 @@ _IS_TIME = re.compile(
 )
 RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
 _OF_MINIMUM = re.compile(r"\b(?:min\w*|mcr|steady|second\w*|station\w*|sekund\w*|lowest|smallest|kleinste\w*)\b")
-_ANY_CREEP_RATE = re.compile(
-    r"(?:(?:creep|de|of|du|fluage|the|true|strain|deformation) )*"
-    r"(?:kriech(?:dehn(?:ungs)?)?(?:rate|geschwindigkeit)|(?:creep )?(?:strain )?rate|vitesse(?: de (?:deformation|fluage))*)"
-)
+_CREEP_RATE = re.compile(r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*) ?)+")
 _ANOTHER_RATE = re.compile(
-    r"\b(?:average\w*|avg|mean|mittler\w*|durchschnitt\w*|moyenne?|tertiary|tertiar\w*|tertiaire|primary|primar\w*|primaire"
-    r"|initial\w*|anfang\w*|start|final\w*|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
+    r"\b(?:average\w*|avg|mean|mittler\w*|durchschnitt\w*|moyenne?|tertia\w*|prima\w*|initial\w*|anfang\w*|final\w*"
+    r"|start|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
 )
 """Of a rate that is the minimum one, that may be it, and that is another one."""
 
@@ -191,7 +188,7 @@ def _quantity_by_words(name: str, unit: str) -> str:
         return "minimum_rate"
     if RATES.fullmatch(plain) and unit in RATE.units:  # in a table of creep tests
         return "minimum_rate"
-    is_time = unit in TIME.units or (_IS_TIME.search(plain) and unit == "")
+    is_time = unit in TIME.units or (unit == "" and _IS_TIME.search(plain))
     is_rate = bool(RATES.search(plain)) and not re.search(r"sd\b|std|err", plain) and unit in (*RATE.units, "", "pct")
     is_min = _OF_MINIMUM.search(plain)
     is_of_no_test = (is_rate or is_time) and _OF_NO_TEST.search(_OF_MINIMUM.sub("", plain) if is_rate else plain)
@@ -206,7 +203,7 @@ def _quantity_by_words(name: str, unit: str) -> str:
 def is_bare_rate(name: str) -> bool:
     """Whether a name is that of a creep rate of which it does not say that it is the smallest."""
     plain = plain_words(name)
-    return plain != "strain rate" and _ANY_CREEP_RATE.fullmatch(plain) is not None
+    return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech", plain) is not None
 
 
 def is_any_rate(written: str) -> bool:

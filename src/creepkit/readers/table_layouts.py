@@ -538,7 +538,7 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
 def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
     """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
-    begins_with_text = [row.cells[0][:1].isalpha() and not is_missing(row.cells[0]) for row in table.rows]
+    begins_with_text = [row.cells[0][:1].isalpha() and row.cells[0].lower() not in _LOST for row in table.rows]
     is_numbered = any(is_number(row.cells[0], table.dialect) for row in table.rows[1:2])
     last = next((k for k, is_text in reversed([*enumerate(begins_with_text)]) if not is_text), 0)
     is_footer = [is_numbered and k > last for k in range(len(table.rows))]  # "Mean | 0.3"
@@ -571,6 +571,9 @@ def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
     return known[1] < known[0] if known[1:] else not all(map(is_clock_time, cells))
 
 
+_LOST = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
+
+
 def _is_remark(row: TableRow, table: CellTable) -> bool:
     """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
@@ -579,8 +582,7 @@ def _is_remark(row: TableRow, table: CellTable) -> bool:
     if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
         return False
     words = cells[0].lower().strip(".:*-= ").split()
-    lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
-    count = sum(word in lost for word in words)
+    count = sum(word in _LOST for word in words)
     return (len(words) > 1 + 3 * count and count < 2) or words in (["end"], ["eof"])
 
 

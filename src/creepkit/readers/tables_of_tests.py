@@ -176,8 +176,12 @@ class TestTable:
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
         if statistics := [row for row in body if _is_statistic(row, dialect)]:
-            body = [row for row in body if row not in statistics and not _is_statistic(row, dialect, _COUNT)]
-            sheet = sheet.assuming(f"rows of {' and '.join(_texts_of(row, dialect)[0] for row in statistics)} are no tests")
+            first = body.index(statistics[0])
+            tests = [row for row in body[first:] if not _is_statistic(row, dialect, _STATISTIC_OR_COUNT)]
+            body = body[:first] + tests
+            sheet = sheet.assuming(
+                f"rows of {' and '.join(_texts_of(row, dialect)[0] for row in statistics)} are no tests"
+            )
         while body and _is_note(body[-1], dialect):
             self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
         named = [k for k, name in enumerate(names) if name]
@@ -253,7 +257,11 @@ class TestTable:
                     column = replace(column, unit=unit)
                 if column.unit not in kind.units:
                     self.errors.append(self._wrong_unit(column, written, cells))
-                elif column.quantity == "minimum_rate" and meant == written and is_bare_rate(split_written_name(written)[0]):
+                elif (
+                    column.quantity == "minimum_rate"
+                    and meant == written
+                    and is_bare_rate(split_written_name(written)[0])
+                ):
                     self.table = self.table.assuming(f"'{quoted(written, 60)}' is the minimum creep rate")
             elif self._tells_tests_apart(k, column, cells):
                 column = TestColumn("name")
@@ -407,11 +415,10 @@ _OF_TREATMENT = re.compile(
 
 
 _STATISTIC = re.compile(
-    r"(?:arithmetic |sample )?(?:mean|averages?|avg|median|sd|s d|std(?: ?dev)?|st(?:d |andard )?dev(?:iation)?|cov|scatter"
-    r"|min(?:imum)?|max(?:imum)?|range|(?:arithm\w* )?mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|varianz"
-    r"|variance|moy(?:enne)?|ecart(?: |-)?type|mediane?)(?: values?| wert)?(?: of .*)?"
+    r"(?:arithm\w* )?(?:mean|averages?|avg|median|sd|s d|std|st\w* ?dev\w*|cov|scatter|min(?:imum)?|max(?:imum)?|range"
+    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|ecart type|mediane?)(?: values?| of .*)?"
 )
-_COUNT = re.compile(r"n|count|number|anzahl|nombre")
+_STATISTIC_OR_COUNT = re.compile(rf"{_STATISTIC.pattern}|n|count|number|anzahl|nombre")
 """Of a row below tests that is no test; and of one beside such a row."""
 
 
