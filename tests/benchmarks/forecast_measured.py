@@ -29,10 +29,9 @@ from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.forecasts.draws import SimulatedTest, crossing_times, law_draws, uncertain_quantities
-from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.reference_conditions import reference_temperature
+from creepkit.inverse.reference_conditions import reference_temperature, usable_frames
 from creepkit.quality.repeats import duplicate_tests
 from creepkit.records import History
 

@@ -26,7 +26,7 @@ from creepkit.discovery.temperature_law import TemperatureLaw, refit
 from creepkit.inverse.cross_validation import CrossValidation
 from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import StartingEstimate
+from creepkit.inverse.search.multistart import StartingEstimate
 
 LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)

@@ -25,9 +25,9 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import sound_tests, suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.search.multistart import StartingEstimate
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.elastic import Elastic, wachtman

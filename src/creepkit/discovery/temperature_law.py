@@ -50,11 +50,11 @@ from creepkit.inverse.evidence import evidence_weights
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.search.multistart import StartingEstimate
 from creepkit.inverse.selection import rank
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.settings import IdentificationSettings

@@ -24,9 +24,9 @@ from creepkit.experiments.expectations import Expectation, LawCriterion, Precisi
 from creepkit.experiments.planned_design import ALIKE, Design, PlannedTest
 from creepkit.experiments.planned_outcomes import KnownLaw, PlannedOutcomes
 from creepkit.experiments.rig import CandidateTest, Rig, candidates_given, grid_of_rig, rigs_for
-from creepkit.inverse.errors_of_tests import with_expected_scatter
 from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.perturbations import with_expected_scatter
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity
 from creepkit.language import temperature

@@ -2,7 +2,7 @@
 
 The unknowns q = (u, s, c) of a law are its conditioned coordinates u, the nuisance parameters s that tests share, such
 as the modulus of an alloy, and the errors c, in their standard deviations, that an instrument has in all tests alike:
-those usual errors that intervals include (inverse.errors_of_tests). The tests that were made know them with the
+those usual errors that intervals include (inverse.perturbations). The tests that were made know them with the
 information
 
     A = J'C^-1 J + P,
@@ -26,14 +26,13 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.errors_of_tests import LIFE, RATE, errors_of_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import with_minimum_rates
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
-from creepkit.inverse.perturbations import with_derivatives_to_lengths
+from creepkit.inverse.perturbations import LIFE, RATE, errors_of_tests, with_derivatives_to_lengths
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.residuals import candidate_residuals

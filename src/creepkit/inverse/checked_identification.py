@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 from creepkit.checked_arguments import checked
 from creepkit.inverse.composite_predictor import through_for_law
-from creepkit.inverse.held_stress import with_hold_tried
 from creepkit.inverse.history_checks import length_notes, loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify as identify_law
@@ -16,6 +15,7 @@ from creepkit.inverse.identify import sampled_where_needed
 from creepkit.inverse.nuisance_parameters import check_nuisance_tests
 from creepkit.inverse.selection import Ranking
 from creepkit.inverse.selection.select import select as select_law
+from creepkit.inverse.selection.select import with_hold_tried
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.term_selection import identify_sparse
 from creepkit.language import CreepLaw

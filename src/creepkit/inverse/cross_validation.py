@@ -10,10 +10,10 @@ from typing import Literal
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
+from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.single_values import SingleValue
 from creepkit.records import History, Prediction

@@ -12,9 +12,9 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import noise_standard_deviation, usable_frames
 from creepkit.inverse.single_values import SingleValue
 from creepkit.records import History, Prediction, is_logarithmic
 

@@ -19,14 +19,18 @@ from creepkit import registry
 from creepkit.arrays import Floats
 from creepkit.errors import FitWarning
 from creepkit.inverse.compared_tests import UNTESTABLE, compared_tests, followed_duration, rests_on_durations
-from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses, simulated_stresses
+from creepkit.inverse.reference_conditions import (
+    reference_end_strain,
+    reference_stresses,
+    simulated_stresses,
+    usable_frames,
+)
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Predictor, Status
@@ -157,7 +161,7 @@ def identification_notes(estimation: EstimationResult, nuisances: Sequence[Nuisa
 def one_end_note(minima: Mapping[str, int]) -> tuple[str, ...]:
     """That a search had one start alone, if it had.
 
-    minima : see inverse.initial_search.
+    minima : see inverse.search.multistart.
     """
     if minima.get("search_ends") != 1:
         return ()

@@ -10,8 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import CreepkitError, FitError
-from creepkit.inverse.bound_penalties import check_bounds
-from creepkit.inverse.bounds import MOST_WIDENINGS, widened, widened_notes, with_determined
+from creepkit.inverse.bounds import MOST_WIDENINGS, check_bounds, widened, widened_notes, with_determined
 from creepkit.inverse.compared_tests import compared_tests, compares_rupture_times
 from creepkit.inverse.composite_predictor import predictors_for_law, through_for_law
 from creepkit.inverse.defect_correction import (
@@ -20,13 +19,6 @@ from creepkit.inverse.defect_correction import (
     shift_of_values,
     with_cheaper_predictor,
     with_correction_at_frames,
-)
-from creepkit.inverse.errors_of_tests import (
-    LIFE,
-    RATE,
-    covariances_of_values_with_errors,
-    errors_of_tests,
-    with_expected_scatter,
 )
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
@@ -38,7 +30,6 @@ from creepkit.inverse.identification_notes import (
     one_end_note,
     provenance_of,
 )
-from creepkit.inverse.initial_search import SearchOutcome, StartingEstimate, initial_search
 from creepkit.inverse.iterative_estimation import (
     APPROXIMATE_LIMITS,
     EXACT_LIMITS,
@@ -58,11 +49,20 @@ from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbation import unmodelled_note
-from creepkit.inverse.perturbations import perturbations, with_derivatives_to_lengths
+from creepkit.inverse.perturbations import (
+    LIFE,
+    RATE,
+    covariances_of_values_with_errors,
+    errors_of_tests,
+    perturbations,
+    with_derivatives_to_lengths,
+    with_expected_scatter,
+)
 from creepkit.inverse.prediction_failures import FAILED, tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.rate_explanations import RateExplanations
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.search.multistart import SearchOutcome, StartingEstimate, initial_search
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples

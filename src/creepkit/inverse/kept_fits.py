@@ -33,9 +33,9 @@ from creepkit.files.json_documents import (
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.inverse.composite_predictor import predictors_for_law
-from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json, with_shapes
+from creepkit.inverse.predictor_documents import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.limits import ANY_NUMBER
 from creepkit.records import Predictor

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.frame_noise import frame_noise, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.reference_conditions import frame_noise, usable_frames
 from creepkit.records import History
 
 FREEDOM_PER_FRAME = 0.2

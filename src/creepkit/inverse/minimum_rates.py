@@ -20,9 +20,8 @@ from scipy.stats import t as student
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.compared_tests import compares_minimum_rate, duration_known, followed_duration, needs_durations
-from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, strain, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import (

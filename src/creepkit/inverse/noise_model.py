@@ -23,7 +23,7 @@ from creepkit.records import Nuisance
 
 @dataclass(frozen=True, eq=False)
 class StoppedTests:
-    """What stopped tests say, as Gaussian observations about one point (see inverse.stopped_tests).
+    """What stopped tests say, as Gaussian observations about one point (see inverse.noise_covariance).
 
     shift, sd : (tests, observations) -, what is added to the residuals of their ends, and the standard deviation that
     these have beyond the noise model, None where no test was stopped. chi_square, log_variance : -2 ln of the

@@ -18,9 +18,9 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.compared_tests import compares_minimum_rate, followed_duration
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.frame_noise import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform, SingleValueTransform
+from creepkit.inverse.reference_conditions import frame_noise, noise_standard_deviation, usable_frames
 from creepkit.quality.curve_shapes import runs_away
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
 from creepkit.records.history import correlation_matrix

@@ -19,14 +19,13 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
-from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.bounds import BoundPenalties, Bounds, constraint_points
 from creepkit.inverse.compared_tests import compares_rupture_times
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
 from creepkit.inverse.minimum_rates import check_minimum_rates, with_minimum_rates
-from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_covariance import CovarianceFactor, stopped_tests
 from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
@@ -41,7 +40,6 @@ from creepkit.inverse.reference_conditions import (
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
 from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.stopped_tests import stopped_tests
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
 from creepkit.kernels import lower

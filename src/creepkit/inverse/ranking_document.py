@@ -18,7 +18,7 @@ from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import LAW_SIGNS, numbered_stems
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import IDENTIFICATION, identification_from_json
-from creepkit.inverse.selection.perturbation_trials import Challenge
+from creepkit.inverse.selection.challenges import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking
 from creepkit.limits import numbers
 

@@ -1,10 +1,11 @@
-"""Reference conditions: stress, strain and temperature that characterise a test, and whether it shows creep."""
+"""What a test states or shows of itself, before any law: its usable frames, their noise, and reference conditions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,32 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.checked_arguments import checked
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.compared_tests import followed_duration
-from creepkit.inverse.frame_noise import noise_standard_deviation, usable_frames
 from creepkit.language import CreepLaw, arrhenius, temperature
 from creepkit.records import ZERO_CELSIUS, History, Predictor, growing_output, is_logarithmic, specimen_of
 from creepkit.records.conditions import reference_conditions
+from creepkit.records.reading_noise import noise_of_readings
+
+
+def usable_frames(history: History, output: str) -> Bools:
+    """(frames,) which frames of one output may be used: marked so, after time zero, and a number."""
+    return np.asarray(history.used & (history.times > 0) & np.isfinite(history.outputs[output]))
+
+
+@lru_cache(maxsize=4096)
+def frame_noise(history: History, output: str) -> float:
+    """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames."""
+    used = usable_frames(history, output)
+    return 0.0 if used.sum() < 6 else noise_of_readings(history.outputs[output][used], history.times[used], order=3)
+
+
+def noise_standard_deviation(history: History, output: str) -> Floats:
+    """(frames,) standard deviation of one output, in its unit: as the history states it, else from frame to frame."""
+    stated = history.standard_deviation.get(output)
+    estimated = np.full(history.times.size, frame_noise(history, output))
+    if stated is None:
+        return estimated
+    return np.where(np.isfinite(stated) & (stated > 0), stated, estimated)
+
 
 HELD_LOAD = 0.02
 """Relative change of a load within which it is held."""

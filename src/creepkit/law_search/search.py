@@ -24,10 +24,9 @@ from creepkit.inverse.evidence import DECISIVE_EXCESS
 from creepkit.inverse.history_checks import loading_notes, rig_notes, sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import StartingEstimate, search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures, with_arrhenius
-from creepkit.inverse.search.multistart import refined
+from creepkit.inverse.search.multistart import StartingEstimate, refined, search_problem
 from creepkit.inverse.selection.discrimination import score_under_own_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.selection.select import as_shown

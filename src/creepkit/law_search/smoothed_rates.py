@@ -20,7 +20,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import Bounds
-from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.inverse.search.local_refinement import Minimum, Tolerances, bounded_least_squares
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw

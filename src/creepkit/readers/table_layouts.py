@@ -543,7 +543,7 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
     last = next((k for k, is_text in reversed([*enumerate(begins_with_text)]) if not is_text), 0)
     is_footer = [is_numbered and k > last for k in range(len(table.rows))]  # "Mean | 0.3"
     for k, row in enumerate(table.rows):
-        after = table.rows[k + 1 : k + 2]
+        after = [one for one in table.rows[k + 1 : k + 6] if not _is_remark(one, table)][:1]
         is_remark = _is_remark(row, table) and not any(_begins_again(table.rows[k - 1], one, table) for one in after)
         if k < 2 or not (is_remark or is_footer[k]):
             frames.append(row)

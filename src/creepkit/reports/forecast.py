@@ -14,7 +14,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.forecasts.banded_output import CHOICE_OF_LAW, LAW
 from creepkit.forecasts.draws import MISFIT_THERE
-from creepkit.inverse.frame_noise import usable_frames
+from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
@@ -156,7 +156,7 @@ def _remarks(test: TestForecast) -> Iterator[str]:
     if shares := end_shares(next(iter(test.outputs.values()), None)):
         parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in shares.items())
         yield f"shares of the variance at its end, to first order: {parts}"
-    yield from filter(None, (test.extrapolation, test.caution, *test.notes))
+    yield from filter(None, (test.extrapolation.replace("), ", "); "), test.caution, *test.notes))
 
 
 def _figures(test: TestForecast) -> Iterator[KeyFigure]:

@@ -15,8 +15,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.defect_correction import with_correction_at_frames
-from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic, output_unit
 from creepkit.reports.figures import set_range

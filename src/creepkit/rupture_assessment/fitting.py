@@ -32,7 +32,7 @@ from scipy.special import logsumexp, stdtrit
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import FitError
-from creepkit.inverse.stopped_tests import HALF_LOG_TAU, log_survival
+from creepkit.inverse.noise_covariance import HALF_LOG_TAU, log_survival
 from creepkit.inverse.uncertainty.quantities import gradient
 from creepkit.records import SECONDS_PER_HOUR
 from creepkit.rupture_assessment.methods import MINIMUM_RATE, MONKMAN_GRANT, Basis, Centre, Conditions, RuptureMethod

@@ -24,10 +24,10 @@ from creepkit.checked_arguments import checked
 from creepkit.errors import SAID, CreepkitError, FitError, HistoryError, restated
 from creepkit.files.writing import hashed_stem
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.fingerprints import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.history_checks import sound_tests
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.predictor_documents import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select

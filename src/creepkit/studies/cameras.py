@@ -23,7 +23,7 @@ from creepkit.files.record_codec import record_to_json
 from creepkit.forecasts.planned_tests import stepped_load
 from creepkit.instruments.imposed import Imposed
 from creepkit.instruments.reading_options import RecordOptions
-from creepkit.inverse.fingerprints import predictor_fingerprint
+from creepkit.inverse.predictor_documents import predictor_fingerprint
 from creepkit.language import elastic_of
 from creepkit.options import values_of_table
 from creepkit.records import ZERO_CELSIUS, History, Loading, Nuisance, Specimen, dimensions_of, loads_of

@@ -14,10 +14,10 @@ from creepkit.files.json_documents import DocumentFormat, canonical_json, check_
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError, ValueCodec
 from creepkit.files.writing import hashed_stem, write_text
-from creepkit.inverse.fingerprints import short_hash
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC
 from creepkit.inverse.kept_fits import code_fingerprint, history_digest, kept_from_json, kept_to_json
+from creepkit.inverse.predictor_documents import short_hash
 from creepkit.language import CreepLaw, Elastic
 from creepkit.limits import ANY_NUMBER
 from creepkit.records import (
@@ -75,7 +75,7 @@ def codec_of(histories: Sequence[History], predictor: Predictor | None = None) -
     histories : the tests of the study, which are stored by name; others, such as planned ones, are stored whole.
     predictor : of identifications whose file does not give one, such as a surrogate.
     """
-    from creepkit.inverse.selection.perturbation_trials import Challenge
+    from creepkit.inverse.selection.challenges import Challenge
 
     by_name = {history.name: history for history in histories}
     digests = {name: history_digest(history) for name, history in by_name.items()}

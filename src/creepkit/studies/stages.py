@@ -16,8 +16,8 @@ from creepkit.files.record_codec import record_to_json
 from creepkit.files.writing import hashed_stem
 from creepkit.forecasts.planned_tests import ForecastOptions
 from creepkit.inverse.candidate_laws import SearchOptions
-from creepkit.inverse.fingerprints import predictor_fingerprint
 from creepkit.inverse.kept_fits import history_digest
+from creepkit.inverse.predictor_documents import predictor_fingerprint
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import elastic_of, temperature

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.identify import identify
 from creepkit.inverse.judging import Judge
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import frame_noise
 from creepkit.inverse.residuals import orthogonal_distance
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE

@@ -11,10 +11,10 @@ from creepkit.errors import FitError, FitWarning
 from creepkit.inverse.candidates import candidates, named_candidates
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.extrapolation import extrapolation_text
-from creepkit.inverse.frame_noise import frame_noise
 from creepkit.inverse.history_checks import suspect_frames_note, without_suspect_frames
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
+from creepkit.inverse.reference_conditions import frame_noise
 from creepkit.inverse.selection import rank
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import arrhenius

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.errors_of_tests import with_expected_scatter
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -17,6 +16,7 @@ from creepkit.inverse.perturbations import (
     _log_rate_gradient,
     perturbations,
     value_changes,
+    with_expected_scatter,
 )
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances

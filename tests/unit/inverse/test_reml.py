@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm, t
 
-from creepkit.inverse.errors_of_tests import covariances_of_values_with_errors
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.perturbations import covariances_of_values_with_errors
 from creepkit.inverse.residuals import life_sensitivity, orthogonal_distance
 from creepkit.inverse.variance_components import (
     LinearisedProblem,

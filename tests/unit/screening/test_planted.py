@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.frame_noise import frame_noise
+from creepkit.inverse.reference_conditions import frame_noise
 from creepkit.screening.alloys import read_compositions
 from helpers.paths import EXAMPLES
 

@@ -3,7 +3,7 @@
 The common covariance is that of the law which explains the histories best. With a covariance of its own each law would
 count as noise what it cannot describe. The problems are linear about their optima, so that no simulation is needed to
 move each law to its optimum under the common covariance. Laws are ranked with the errors that tests usually have (see
-inverse.errors_of_tests) integrated out, each with its effect by the law itself: what a thickness that is off by 2 %
+inverse.perturbations) integrated out, each with its effect by the law itself: what a thickness that is off by 2 %
 explains is no evidence between two laws. The determinant of the covariance belongs to the evidence then.
 
 With r_a and r_b the residuals of two laws on the same frames and C the common covariance,

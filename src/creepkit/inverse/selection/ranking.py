@@ -31,8 +31,8 @@ from creepkit.records.presentable import Plotted, Presentable, Tabulated
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy
+    from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
-    from creepkit.inverse.selection.perturbation_trials import Challenge
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
     from creepkit.records import History, LawWithValues
 
@@ -275,10 +275,9 @@ def _are_outdone(fits: Sequence[Identification], further: Collection[str]) -> li
 def challenged(ranking: Ranking) -> Ranking:
     """The ranking with its best law challenged, where its tests and predictor are at hand.
 
-    Where no law is singled out, what nobody modelled is tried alone (see selection.perturbation_trials).
+    Where no law is singled out, what nobody modelled is tried alone (see selection.challenges).
     """
-    from creepkit.inverse.selection.challenges import challenges_of
-    from creepkit.inverse.selection.perturbation_trials import explaining_effects
+    from creepkit.inverse.selection.challenges import challenges_of, explaining_effects
 
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):

@@ -34,14 +34,18 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.evidence import DECISIVE_EXCESS, occam_penalty
-from creepkit.inverse.frame_noise import usable_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.initial_search import StartingEstimate
 from creepkit.inverse.observation_vector import selected_frames
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.reference_conditions import growth_per_strain, reference_end_strain, reference_stresses
+from creepkit.inverse.reference_conditions import (
+    growth_per_strain,
+    reference_end_strain,
+    reference_stresses,
+    usable_frames,
+)
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, System, Tolerances
+from creepkit.inverse.search.multistart import StartingEstimate
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
 from creepkit.kernels import lower

@@ -1,7 +1,7 @@
 """Laplace's approximation: covariance and intervals of parameters, with their degrees of freedom.
 
 The scatter between tests is in the covariance with its expected square, given the tests (see
-inverse.errors_of_tests); the noise of readings, of which there are many, with degrees of freedom of its own.
+inverse.perturbations); the noise of readings, of which there are many, with degrees of freedom of its own.
 """
 
 from __future__ import annotations

@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.inverse.errors_of_tests import errors_of_tests, with_expected_scatter
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.perturbations import errors_of_tests, with_expected_scatter
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
 

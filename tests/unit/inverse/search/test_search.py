@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.initial_search import search_problem
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.multistart import refined, screened_starts
+from creepkit.inverse.search.multistart import refined, screened_starts, search_problem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
 

@@ -15,13 +15,13 @@ from creepkit.inverse.selection.challenges import (
     SHARE,
     THRESHOLD,
     FittedLaw,
+    Trial,
     _least_excess,
     altered_laws,
     challenges_of,
     share_residual,
 )
 from creepkit.inverse.selection.discrimination import equivalent_laws
-from creepkit.inverse.selection.perturbation_trials import Trial
 from creepkit.inverse.selection.ranking import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Param, arrhenius, stress

@@ -14,8 +14,8 @@ from creepkit.inverse.evidence import occam_penalty
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.selection.challenges import Challenge
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.inverse.selection.perturbation_trials import Challenge
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, _are_outdone, challenged, rank, ranking_from_scores
 from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
 from creepkit.inverse.settings import IdentificationSettings
@@ -277,7 +277,7 @@ def test_what_is_not_predicted_has_no_positive_verdict():
 
 def test_a_law_that_can_be_predicted_is_challenged_in_full_where_it_is_singled_out(monkeypatch):
     monkeypatch.setattr("creepkit.inverse.selection.challenges.challenges_of", lambda fits: (SUM,))
-    trials = "creepkit.inverse.selection.perturbation_trials.explaining_effects"
+    trials = "creepkit.inverse.selection.challenges.explaining_effects"
     monkeypatch.setattr(trials, lambda fits, weights: ())
     at_hand = {"predictor": object(), "histories": (object(),)}
     whole = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
