@@ -176,12 +176,11 @@ class TestTable:
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
         if statistics := [row for row in body if _is_statistic(row, dialect)]:
-            first = body.index(statistics[0])
-            tests = [row for row in body[first:] if not _is_statistic(row, dialect, _STATISTIC_OR_COUNT)]
-            body = body[:first] + tests
-            sheet = sheet.assuming(
-                f"rows of {' and '.join(_texts_of(row, dialect)[0] for row in statistics)} are no tests"
+            body = [row for row in body if row not in statistics]
+            called = " and ".join(
+                cell for row in statistics for cell in row.cells if _STATISTIC.fullmatch(words_of(cell))
             )
+            sheet = sheet.assuming(f"rows of {called} are no tests")
         while body and _is_note(body[-1], dialect):
             self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
         named = [k for k, name in enumerate(names) if name]
@@ -416,20 +415,15 @@ _OF_TREATMENT = re.compile(
 
 _STATISTIC = re.compile(
     r"(?:arithm\w* )?(?:mean|averages?|avg|median|sd|s d|std|st\w* ?dev\w*|cov|scatter|min(?:imum)?|max(?:imum)?|range"
-    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|ecart type|mediane?)(?: values?| of .*)?"
+    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|[ée]cart type)(?: values?| of .*)?"
 )
-_STATISTIC_OR_COUNT = re.compile(rf"{_STATISTIC.pattern}|n|count|number|anzahl|nombre")
-"""Of a row below tests that is no test; and of one beside such a row."""
+"""Of a row below tests that is no test."""
 
 
-def _texts_of(row: TableRow, dialect: Dialect) -> list[str]:
-    return [cell for cell in row.cells if cell and not is_number_like(cell, dialect)]
-
-
-def _is_statistic(row: TableRow, dialect: Dialect, words: re.Pattern[str] = _STATISTIC) -> bool:
+def _is_statistic(row: TableRow, dialect: Dialect) -> bool:
     """Whether the one text in a row of numbers is that of a statistic of the rows above it."""
-    texts = _texts_of(row, dialect)
-    return len(texts) == 1 and words.fullmatch(plain_words(texts[0]).replace("|", "").strip()) is not None
+    texts = [cell for cell in row.cells if cell and not is_number_like(cell, dialect)]
+    return len(texts) == 1 and _STATISTIC.fullmatch(words_of(texts[0])) is not None
 
 
 def _is_note(row: TableRow, dialect: Dialect) -> bool:

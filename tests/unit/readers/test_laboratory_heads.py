@@ -263,12 +263,6 @@ def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, tex
     assert (ruptured.unruptured, ruptured.rupture_time) == (False, 800 * 3600.0)
 
 
-@pytest.mark.parametrize("text", ["test abgebrochen", "interrupted", "furnace failure", "Kopf abgebrochen", "stopped"])
-def test_a_remark_that_a_test_was_interrupted_is_asked_about(tmp_path, text):
-    with pytest.raises(HistoryError, match=r"t.csv:3: 'remark' says .* did these tests break, .* tests\.toml"):
-        _read(tmp_path, TABLE.format(name="remark", a="", b=text))
-
-
 @pytest.mark.parametrize("mark", ["n.a.", "n/a", "NA", "n.b.", "-", "--", "k.A.", ""])
 def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark):
     table = f"test,stress_MPa,T (C),min creep rate (1/h),t_r (h)\nA,200,800,1e-6,{mark}\nB,220,800,2e-6,800\n"

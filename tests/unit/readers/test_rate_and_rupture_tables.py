@@ -156,14 +156,14 @@ def test_a_rate_that_is_not_the_smallest_and_a_time_that_was_not_measured_are_la
         read(tmp_path, f"test;stress (MPa);T (C);{name}\nA;140;550;0.5\nB;120;550;0.25\n")
 
 
-@pytest.mark.parametrize(("name", "said"), [("Creep rate (1/h)", True), ("Steady-state creep rate (1/h)", False)])
+@pytest.mark.parametrize(("name", "said"), [("Creep rate (1/h)", True), ("Steady creep rate (1/h)", False)])
 def test_a_rate_of_which_nothing_says_that_it_is_the_smallest_is_said_to_be(tmp_path, name, said):
     first, _ = read(tmp_path, f"test;stress (MPa);T (C);{name}\nA;140;550;1e-5\nB;120;550;1e-6\n")
     assert first.minimum_rate == pytest.approx(1e-5 / 3600)
     assert ("is the minimum creep rate" in first.labels["assumed"]) is said
 
 
-@pytest.mark.parametrize("rows", ["Mean;140;550;950\nSD;0;0;212\nn;2;2;2", "Mittelwert;;;950", "Écart-type;0;0;212"])
+@pytest.mark.parametrize("rows", ["Mean;140;550;950\nStd. dev.;0;0;212", "Mittelwert;;;950", "Écart-type;0;0;212"])
 def test_rows_of_statistics_are_no_tests(tmp_path, rows):
     tests = read(tmp_path, f"test;stress (MPa);T (C);t_r (h)\nA;140;550;800\nN;140;550;1100\n{rows}\n")
     assert [one.name for one in tests] == ["A", "N"]
@@ -243,3 +243,21 @@ def test_a_test_without_frames_reads_back(tmp_path, known):
 def test_a_rate_beside_frames_reads_back(tmp_path):
     test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
     assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
+
+
+def test_a_matrix_of_rupture_times_is_one_test_a_cell(tmp_path):
+    """Temperatures by stresses as data sheets print them, in two languages, and in sheets of two heats."""
+    expected = [(550, 235, 20.3, None), (550, 196, 132.3, None), (550, 177, None, 6e4), (600, 196, None, 11.9)]
+    for head in (
+        "Creep rupture data, heat B7 (h);;;\nTemperature (C);235 MPa;196 MPa;177 MPa",
+        "Bruchzeit in h, Charge B7;;;\nTemperatur [°C];Spannung [MPa];;\n;235;196;177",
+    ):
+        tests = read(tmp_path, f"{head}\n550;20.3;132.3;(60000)\n600;-;>11.9;-\n")
+        for test, (celsius, stress, broke, lasted) in zip(tests, expected, strict=True):
+            found = (test.temperature - 273.15, test.loading.steps[0][1], test.times[-1] / 3600.0)
+            assert found == pytest.approx((celsius, stress, broke or lasted)), head
+            assert (test.unruptured, test.labels["heat"]) == (broke is None, "B7"), head
+    head = [["Test temp. (°C)", "Time to rupture (h) at stress (MPa) of"], [None, 235, 196], [550, 20.3, "(60000)"]]
+    sheets = {f"Heat {heat}": [[f"Creep rupture data, Heat {heat}"], *head] for heat in ("AAA", "AAB")}
+    tests = ck.read_histories(workbook(tmp_path / "matrix.xlsx", sheets))
+    assert [(one.labels["heat"], one.unruptured) for one in tests[1:3]] == [("AAA", True), ("AAB", False)]
