@@ -211,7 +211,7 @@ def local_exponent(
 ) -> CoordinateFunction:
     """The local stress exponent at points.
 
-    stress, temperature : numbers or arrays that broadcast to (points,), as in `log_rate`; state : strain and time, too.
+    stress, temperature : as in `log_rate`, they broadcast to (points,). state : strain and time, numbers or (points,).
     """
     level = np.asarray(stress, float)
     above, below = (
