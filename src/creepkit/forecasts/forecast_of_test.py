@@ -21,11 +21,10 @@ from creepkit.forecasts.banded_output import (
     OutputForecast,
 )
 from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
-from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text
+from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text, outside_combinations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import simulated_stresses, usable_frames
-from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD
@@ -226,7 +225,7 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
     """s, when the measured output first reaches a target; NaN where it does not, or is not measured."""
     if output not in history.outputs:
         return float("nan")
-    used = usable_frames(history, output) & (history.times > 0)
+    used = usable_frames(history, output)
     times = history.times[used]
     crossing = first_crossing(times, history.outputs[output][used], target)
     return crossing if times.size and times[0] < crossing < np.inf else float("nan")
@@ -241,7 +240,7 @@ def _inside(banded: History, outputs: Mapping[str, OutputForecast]) -> FramesIns
     for name, forecast in outputs.items():
         if name not in banded.outputs or not usable_frames(banded, name).any():
             continue
-        used, band = usable_frames(banded, name) & (banded.times > 0), forecast.band
+        used, band = usable_frames(banded, name), forecast.band
         values = banded.outputs[name]
         shares[name] = float(((values >= band.low) & (values <= band.high))[used].mean())
         whole[name] = bool(((values >= band.lowest) & (values <= band.highest))[used].all())

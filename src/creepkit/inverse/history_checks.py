@@ -9,7 +9,7 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.observation_vector import ObservationVector, frames_with_data
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
@@ -198,7 +198,7 @@ def _check_outputs(history: History, predictor: Predictor) -> None:
             f"it has {', '.join(history.outputs) or 'none'}"
         )
     used = history.used & (history.times > 0)
-    if int((used & frames_with_data(history)).sum()) < 2:
+    if int((used & history.frames_with_data).sum()) < 2:
         raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
     for name in outputs:
         if np.isinf(history.outputs[name][used]).any():
@@ -212,9 +212,9 @@ def _check_without_frames(history: History, predictor: Predictor) -> None:
             f"history '{history.name}' has no frames, no minimum rate and no known end: nothing to identify a law from"
         )
     if history.minimum_rate is None and not predictor.for_history(history).follows_to_rupture:
-        name = getattr(predictor.for_history(history), "name", "predictor")
         raise FitError(
-            f"history '{history.name}' has its end alone, and {name} follows no test to rupture; leave the test out"
+            f"history '{history.name}' has its end alone, and {predictor.for_history(history).label} follows no test "
+            "to rupture; leave the test out"
         )
 
 
@@ -225,7 +225,7 @@ def check_explicit_nuisances(
     if not kinds or not observations.followed_to_rupture.any():
         return
     history = histories[int(np.argmax(observations.followed_to_rupture))]
-    name = getattr(predictor.for_history(history), "name", "predictor")
+    name = predictor.for_history(history).label
     raise FitError(
         f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
         f"{name}); leave it out, or drop how they ended: history.replace(rupture_time=None, unruptured=False)"
