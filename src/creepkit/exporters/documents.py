@@ -230,7 +230,8 @@ class MathmlPrinter(ReadableSums, MathMLPresentationPrinter):  # type: ignore[mi
             kept = expr.replace(sympy.exp, Exponential)
         except ValueError:  # of a maximum, which sympy cannot compare with the exponential of a number
             kept = expr
-        return re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
+        text = re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
+        return text.replace("<mo>&#x2062;</mo>", '<mo rspace="0.17em">&#x2062;</mo>')  # b exp, and not bexp
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:
         if sym in _VARIABLE_NAMES:
