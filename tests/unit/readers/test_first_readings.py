@@ -290,6 +290,8 @@ ASKED = {
     f"{BAR}Compliance;0,02\nTime (h);Load (N);Extension (mm)\n0;70;0\n1;70;0,2\n": "'Compliance' leaves open whether",
     "Test;Stress (MPa);T (C);t_r (h);Specimen\nA;140;550;800;smooth\nB;140;550;900;notched Kt=3\n": "'notched Kt=3'",
     f"{C}{MPA}Test type;constant stress\n{STRAIN}0;0\n9;0,2\n": "true stress held, or the load",
+    "Test;Stress (MPa);T (C);t_r (h)\nA;140;550;123\nB;120;550;12.345\nC;110;550;23.456\n": "may be 12.345 or 12345",
+    f"{C}E;160;GPa\nTime (h);Remaining stress (MPa)\n0;200\n1;180\n": "strain was held, .* strain_pct = 0.125",
     f"{C}{MPA}Part;{STRAIN}1;0;0\n1;9;0,2\n2;0;0,2\n2;9;0,3\n": "'Part' numbers parts whose clock begins anew",
 }
 
