@@ -188,6 +188,12 @@ class CellTable:
         columns = [self.columns[k] for k in kept]
         return replace(self, columns=columns, rows=with_columns(self.rows, kept), positions=places)
 
+    def with_cells(self, column: int, name: str, texts: Sequence[str]) -> CellTable:
+        """The table with other cells (rows,) and another name in a column."""
+        parts = zip(self.rows, texts, strict=True)
+        rows = [TableRow(r.line, [text if k == column else c for k, c in enumerate(r.cells)]) for r, text in parts]
+        return replace(self, rows=rows, columns=[name if k == column else c for k, c in enumerate(self.columns)])
+
     def assuming(self, *assumptions: str) -> CellTable:
         """The table with more that was assumed of it."""
         return replace(self, assumptions=(*self.assumptions, *assumptions))
