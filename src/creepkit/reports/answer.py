@@ -24,19 +24,7 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
-from creepkit.reports.blocks import (
-    MOST_NAMED,
-    Answer,
-    Rich,
-    Table,
-    as_text,
-    ends,
-    listed,
-    named,
-    number,
-    plural,
-    printable,
-)
+from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
 from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
@@ -142,11 +130,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    over = ends([one.stress for one in rates], 3) if rates else ""
-    by_tests = f"{measured:.2g} by minimum rates over {over} MPa" if math.isfinite(measured) else ""
+    by_tests = f"{measured:.2g} over all tests" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
+        by_tests = f"{by_rates.text} over all tests" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)

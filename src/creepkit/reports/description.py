@@ -1,6 +1,6 @@
 """How well a law describes and predicts its tests, in the units of who made them, whatever chi-square says of it.
 
-Real tests contradict almost every law; a law that is contradicted and predicts within a few per cent is useful. Rates
+Real tests reject almost every law; a law that is rejected and predicts within a few per cent is useful. Rates
 are those of tests the law has not seen: each is compared with what the others say of it.
 """
 
