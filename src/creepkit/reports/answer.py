@@ -195,7 +195,7 @@ def time_figure(one: TimeForecast) -> KeyFigure:
     inside = {True: "inside", False: "outside", None: ""}[one.inside]
     said = [f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}"] * math.isfinite(one.measured)
     if math.isfinite(one.value) and abs(one.value - one.median) > OTHER_MEDIAN * one.median:
-        said.append(FORECAST["by values"].format(hours=hours_number(one.value)))
+        said.append(FORECAST["by values"].format(hours=_written_out(one.value / SECONDS_PER_HOUR, 3)))
     hours = (one.median, one.low, one.high)
     return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", "; ".join(said))
 

@@ -125,7 +125,7 @@ def _values(fit: Identification) -> Table:
     held = ", if the law held" if rejected(fit) else ""
     last = f"by these tests{held or ', given this law'}"
     columns = ("parameter", "meaning", "value", f"95 % interval{held}", "unit", last)
-    caption = "values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
+    caption = "values to ten digits (JSON has all), for stress as a ratio to 1 MPa and time as a ratio to 1 s"
     return Table(f"{'a law that does not fit the tests: ' * bool(held)}{caption}", columns, rows, numeric=(2, 3))
 
 

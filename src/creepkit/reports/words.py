@@ -147,7 +147,7 @@ COMPARED = {
     # it gives no number for some readings
     "unpredicted": "{law} has the smaller misfit of {what}, but does not predict every test",
     # below their table
-    "chi-square": "chi-square is that of all values under one estimated covariance, a verdict's over the noise alone",
+    "chi-square": "laws are ranked by all readings under one covariance, not by mean misfits; verdicts by noise alone",
 }
 """{kind: what is said of laws that were compared}."""
 
