@@ -25,7 +25,7 @@ from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
 from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
-from creepkit.reports.description import tested_range, tests_text
+from creepkit.reports.description import rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 from creepkit.reports.words import ALL_DIGITS, BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
@@ -246,8 +246,7 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
     tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
     of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # so that another law may be better
-    return list(dict.fromkeys([*of_law, *(_held(others) if rejected else ()), *_data(quality)]))
+    return list(dict.fromkeys([*of_law, *(_held(others) if rejected(fit) else ()), *_data(quality)]))
 
 
 def _of_tests(fit: Identification) -> Iterator[str]:
@@ -345,15 +344,14 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
-    by = "by this law the tests" if rejected else "the tests"
+    by = "by this law the tests" if rejected(fit) else "the tests"
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
             yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
+    if far is not None and not rejected(fit) and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
