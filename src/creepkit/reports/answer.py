@@ -28,7 +28,7 @@ from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, li
 from creepkit.reports.description import rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import ALL_DIGITS, BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
+from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -401,7 +401,7 @@ def answer(
         next_step(fit, ranking, searched),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
-        units=f"{Answer.units}{other}; {ALL_DIGITS}",
+        units=f"{Answer.units}{other}",
         **page,
     )
 

@@ -126,7 +126,7 @@ BRACKETS = (
 """Below the numbers of an answer."""
 
 
-ALL_DIGITS = "all digits: details, files"
+ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
 
 
