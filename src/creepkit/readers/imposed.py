@@ -93,8 +93,7 @@ _REMAINING = re.compile("remaining|residual|relaxed|relaxation|rest-?spannung|rÃ
 
 def _ask_of_relaxation(conditions: StatedConditions, frames: TableFrames) -> None:
     """Ask for the strain that was held in a test whose column is called the remaining stress."""
-    columns = enumerate(frames.table.columns)
-    written = next((frames.table.as_written(k) for k, name in columns if name.startswith("stress")), "")
+    written = next((frames.table.as_written(k) for k, c in enumerate(frames.table.columns) if c[:6] == "stress"), "")
     if not _REMAINING.search(written) or conditions.states_load("strain") or "strain" in frames.values:
         return
     modulus, stress = conditions.number_of("modulus"), float(frames.values["stress"][0])
