@@ -37,7 +37,7 @@ BUDGET = {
     "laws": 136,
     "modules": 747,
     "quality": 1119,
-    "readers": 6424,
+    "readers": 6455,
     "records": 2356,
     "registry": 608,
     "reports": 5889,

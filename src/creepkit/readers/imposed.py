@@ -69,6 +69,14 @@ def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float
 def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
     """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
     terms, load_kinds = conditions.terms, conditions.terms.load_kinds
+    stress = frames.values.get("stress", np.zeros(1))
+    is_alone = {*frames.values} <= {"time", "temperature", "used", "stress", "stress_sd"} and np.ptp(stress) > 0.0
+    if is_alone and not conditions.states_load("strain"):  # what is recorded is the answer to a strain
+        modulus, what = conditions.number_of("modulus"), "a stress is recorded alone, as in a relaxation"
+        held = [float(f"{100.0 * stress.max() / modulus.value:.4g}")] if modulus else []
+        raise conditions.question(f"{what}, and no held strain is stated; how many % is it?", "strain_pct", *held)
+    if is_alone and conditions.take_number("stress") is not None:
+        conditions.record_assumption("stress as recorded")
     quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
     with errors_located_at(
         conditions.location_of(*(f"{quantity}{form}" for quantity in quantities for form in _LOADING_SUFFIXES))
