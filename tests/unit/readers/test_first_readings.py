@@ -335,7 +335,6 @@ LOADED = "Time (h);Stress (MPa);Strain (%);Note\n0;140;0;\n1;140;0,05;\n10;140;0
 @pytest.mark.parametrize(
     ("head", "after", "hours"),
     [
-        ("Remark;ruptured\n", "100;2;25;\n", 99),
         ("Bemerkung;Probe gebrochen\n", "100;0,5;25;\n101;0,4;25;\n102;0,5;25;\n", 99),
         ("", "100;0;25;rompue\n101;0;25;\n", 99),
         ("Remark;broken\n", "99;0;25;\n100;0;25;\n", 99),
