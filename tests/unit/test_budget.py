@@ -37,7 +37,7 @@ BUDGET = {
     "laws": 136,
     "modules": 747,
     "quality": 1119,
-    "readers": 6452,
+    "readers": 6458,
     "records": 2390,
     "registry": 608,
     "reports": 5867,
