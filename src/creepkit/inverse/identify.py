@@ -74,7 +74,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.working_noise import UNRELATED_RATES, WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import UNRELATED_RATES, WorkingNoiseEstimator
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance
 
@@ -228,7 +228,7 @@ def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
     found, estimator = end.best, _working_estimator(end.best.problem, end.numerical_error)
     problem, linear = found.problem, found.linear
     noise = estimator.final(linear, found.noise, problem.parameter_count)
-    working_noise = None if estimator.by_likelihood else with_single_value_weight(found.noise, problem.observations)
+    working_noise = None if estimator.by_likelihood else estimator.weighting(found.noise)
     errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
     by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     u, covariance = np.split(found.x, [problem.parameter_count])[0], by_tests + of_errors
@@ -379,7 +379,7 @@ def _reported(
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
-        working_noise = with_single_value_weight(best.noise, problem.observations)
+        working_noise = estimator.weighting(best.noise)
     expected = with_expected_scatter(problem, linear, noise_model)
     unmodelled = perturbations(
         problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise

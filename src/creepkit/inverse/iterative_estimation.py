@@ -24,7 +24,7 @@ from creepkit.inverse.perturbations import errors_of_tests, with_derivatives_to_
 from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
@@ -118,8 +118,8 @@ def estimate_iteratively(
         problem = problem.about_stopped_tests(x, noise)
         residuals = problem.residuals(x)
         linear = problem.linearised(x, residuals)
-        noise = estimator.estimate(residuals, noise, linear)
-        factor = _covariance_factor(problem, residuals, noise, estimator)
+        noise = estimator.estimate(linear, noise)
+        factor = CovarianceFactor.of_residuals(residuals, estimator.weighting(noise))
         problem = problem.with_covariance(factor)
         if by_likelihood and (is_near or best is not None):
             # the covariance moves with the values: near the end each step is taken under its own
@@ -192,17 +192,10 @@ def _stepped(
         moved = _about_predicted_rates(problem, x, expected, noise)
         there = moved.residuals(x)
         further = replace(moved.linearised(x, there), free=free)
-        if is_finite(there) and _chi_square(further, factor) < _chi_square(linear, factor):
+        if is_finite(there) and further.chi_square(factor)[0] < linear.chi_square(factor)[0]:
             return moved, further, size
         x = 0.5 * (x + linear.x)
     return problem, linear, size
-
-
-def _chi_square(linear: LinearisedProblem, factor: CovarianceFactor) -> float:
-    """Of residuals and priors, at the values of a linear problem."""
-    return float(
-        (factor.whiten(linear.residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
-    )
 
 
 def within_bounds(found: EstimationResult) -> EstimationResult:
@@ -249,14 +242,6 @@ def _about_predicted_rates(
     log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
     known = 0.0 if problem.log_factors is None else problem.log_factors
     return problem.about_rates(x, log_factors) if np.abs(log_factors - known).max() >= NOTEWORTHY_FACTOR else problem
-
-
-def _covariance_factor(
-    problem: LeastSquaresProblem, residuals: Residuals, noise: NoiseModel, estimator: WorkingNoiseEstimator
-) -> CovarianceFactor:
-    """The covariance under which the values of a round are found."""
-    fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
-    return CovarianceFactor.of_residuals(residuals, fitting_noise)
 
 
 def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> float:

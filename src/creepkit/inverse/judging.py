@@ -199,10 +199,9 @@ class Judge:
         observations, histories = self.problem.observations, self.histories
         known, deviation = judged.known, judged.deviation
         series = [
-            (test, name, index)
-            for test in range(len(histories))
-            for position, name in enumerate(observations.outputs)
-            if (index := np.flatnonzero(known.judged[test] & (observations.output_index[test] == position))).size
+            (test, observations.outputs[position], judged_index)
+            for test, position, index in observations.series
+            if (judged_index := index[known.judged[test, index]]).size
         ]
         if not series:
             return None

@@ -17,7 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries, SharedNoise
-from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
+from creepkit.inverse.observation_vector import SINGLE_VALUES
 from creepkit.records import Nuisance
 
 
@@ -219,15 +219,6 @@ class NoiseModel:
     def without_offsets(self) -> NoiseModel:
         """The same without offsets of tests."""
         return replace(self, outputs={name: replace(one, offset=0.0) for name, one in self.outputs.items()})
-
-
-def initial_working_noise(observations: ObservationVector, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """Working noise before anything was fitted: a misfit of 0.3, offsets of the floor of the transform."""
-    by_output = {}
-    for name, transform, noise in zip(observations.outputs, observations.transforms, observations.noise, strict=True):
-        offset = initial_sd(nuisances, "offset", transform.floor, name)
-        by_output[name] = OutputNoise(noise=max(float(noise), 1e-3 * transform.floor), misfit=0.3, offset=offset)
-    return NoiseModel(by_output)
 
 
 def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:

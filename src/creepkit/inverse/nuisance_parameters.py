@@ -160,13 +160,18 @@ class NuisanceParameters:
                     jacobian_matrix[test, :, position] = sensitivities[key][test]
         return jacobian_matrix
 
+    @property
+    def integrated(self) -> list[int]:
+        """Positions of those of single tests that have a prior: what integrate_out() makes part of the covariance."""
+        return [k for k, n in enumerate(self.nuisances[: self.size]) if n.scope == "test" and np.isfinite(self.sd[k])]
+
     def integrate_out(self, residuals: Residuals, e: Floats) -> Residuals:
         """The residuals of tests at their prior means, with the priors as part of the covariance; e : (nuisances,).
 
         To first order. At its estimate a nuisance parameter has taken up what scatter between tests it can, so that the
         residuals there do not show that scatter. Nuisance parameters that tests share stay as estimated.
         """
-        test_parameters = [k for k, n in enumerate(self.nuisances) if n.scope == "test" and np.isfinite(self.sd[k])]
+        test_parameters = self.integrated
         if not test_parameters or residuals.jacobian is None:
             return residuals
         sensitivities = residuals.jacobian[..., -self.size :][..., test_parameters]

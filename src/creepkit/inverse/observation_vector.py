@@ -9,7 +9,7 @@ known, padded to the longest test.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -270,13 +270,8 @@ class ObservationVector:
     def of_tests(self, tests: Sequence[int]) -> ObservationVector:
         """The observations of some of the tests, by position."""
         index = list(tests)
-        rows = {
-            name: getattr(self, name)[index]
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-            and name not in ("noise", "stated", "transformed_values", "discrepancy_unit")
-        }
-        return replace(self, **rows)
+        stored = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("noise", "stated")}
+        return replace(self, **{name: v[index] for name, v in stored.items() if isinstance(v, np.ndarray)})
 
     def with_noise_of(self, other: ObservationVector) -> ObservationVector:
         """The same with the transforms and the noise of other observations of these outputs."""
@@ -330,6 +325,15 @@ class ObservationVector:
     def per_observation(self, values: Sequence[float] | Floats) -> Floats:
         """(tests, observations) numbers of the output of each observation, from values (outputs,)."""
         return np.asarray(values, float)[self.output_index]
+
+    @cached_property
+    def series(self) -> tuple[tuple[int, int, Ints], ...]:
+        """(test, position of an output, (observations,) their indices) of each test and each output that it has."""
+        return tuple(
+            (test, int(position), np.flatnonzero(present & (index == position)))
+            for test, (present, index) in enumerate(zip(self.present, self.output_index, strict=True))
+            for position in np.unique(index[present])
+        )
 
     @property
     def rupture_mask(self) -> Bools:

@@ -232,12 +232,10 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
     observations, residuals = problem.observations, linear.residuals
     predicted = observations.inverse(residuals.values + observations.transformed_values)
     change, by_time = np.zeros_like(predicted), problem.law.uses(time)
-    for test, history in enumerate(problem.histories):
-        for position in np.unique(observations.output_index[test, observations.present[test]]):
-            index = np.flatnonzero(observations.present[test] & (observations.output_index[test] == position))
-            if index.size >= 3 and not observations.rupture_mask[test, index].any():
-                times = observations.times[test, index]
-                change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
+    for test, _, index in observations.series:
+        if index.size >= 3 and not observations.rupture_mask[test, index].any():
+            history, times = problem.histories[test], observations.times[test, index]
+            change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
     reference = problem.coordinates.reference
     factor = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature) * USUAL_DRIFT
     change = factor * change * residuals.offset_sensitivity

@@ -171,10 +171,8 @@ class LeastSquaresProblem:
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
-        noise = WorkingNoiseEstimator(settings, observations, predictor.error).initial()
-        covariance_factor = CovarianceFactor.of_residuals(
-            residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
-        )
+        noise = with_single_value_weight(WorkingNoiseEstimator(settings, observations).initial(), observations)
+        covariance_factor = CovarianceFactor.of_residuals(residuals_at_measured_values(observations), noise)
         conditions = np.array([reference_condition(test, predictor) for test in tests]).T
         posed = (coordinates, observations, nuisances, bounds, settings, covariance_factor, conditions)
         return cls(tuple(tests), predictor, *posed)

@@ -79,6 +79,24 @@ class LinearisedProblem:
         log_det = -float(np.linalg.slogdet(covariance)[1])
         return LinearSolution(step, residuals, weighted_residuals, weighted[..., 1:], covariance, chi2, log_det)
 
+    @property
+    def prior_sd(self) -> Floats:
+        """(unknowns,) standard deviations of the priors."""
+        return np.asarray(1.0 / np.sqrt(np.maximum(self.precision, 1e-300)))
+
+    @property
+    def whole(self) -> LinearisedProblem:
+        """The same with all unknowns free."""
+        return replace(self, free=np.ones_like(self.free))
+
+    def chi_square(self, factor: CovarianceFactor, step: Floats | float = 0.0) -> tuple[float, Floats]:
+        """Of residuals and priors after a step (unknowns,), and the whitened residuals (tests, observations)."""
+        residuals = self.residuals
+        assert residuals.jacobian is not None
+        whitened = factor.whiten(residuals.values + residuals.jacobian @ np.broadcast_to(step, self.precision.shape))
+        prior = self.precision * (self.prior_residual + step) ** 2
+        return float((whitened**2).sum() + prior.sum()), whitened
+
     def step_within(self, factor: CovarianceFactor) -> Floats:
         """(free unknowns,) the step to the optimum within the bounds, or none where it gains nothing."""
         whitened = factor.whiten(np.concatenate([self.jacobian, self.residuals.values[..., None]], axis=-1))

@@ -248,7 +248,7 @@ def drawn(seed, **noise_model):
 def working(linear, errors=None, **known):
     estimator = WorkingNoiseEstimator(LIKELIHOOD, observations(**known), errors)
     previous = NoiseModel({name: OutputNoise(sd) for name, sd in zip(NAMES, NOISE, strict=True)})
-    return estimator.estimate(linear.residuals, previous, linear)
+    return estimator.estimate(linear, previous)
 
 
 def parts(noise_model):

@@ -121,20 +121,11 @@ def _optimum_under(
     without_parameter_priors = replace(linearised, precision=precision)
     step = np.zeros(precision.size)
     step[linearised.free] = without_parameter_priors.step_within(factor)
-    chi_square, whitened = _chi_square(without_parameter_priors, factor, step)
+    chi_square, whitened = without_parameter_priors.chi_square(factor, step)
     stopped = linearised.residuals.stopped
     score = chi_square + stopped.log_variance + stopped.chi_square + factor.log_determinant
     score += occam_penalty(linearised, factor)
-    return chi_square + stopped.chi_square, score, whitened, step
-
-
-def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:
-    residuals = linearised.residuals
-    assert residuals.jacobian is not None
-    whitened = factor.whiten(residuals.values + residuals.jacobian @ step)
-    prior_deviation = linearised.prior_residual + step
-    total = (whitened**2).sum() + (linearised.precision * prior_deviation**2).sum()
-    return float(total), np.where(residuals.present, whitened, 0.0).ravel()
+    return chi_square + stopped.chi_square, score, np.where(linearised.residuals.present, whitened, 0.0).ravel(), step
 
 
 SAME_FUNCTION = 0.05
