@@ -228,22 +228,9 @@ def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
     return noise_model.with_output(name, misfit=0.0) if confounded else noise_model
 
 
-def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output: str = "") -> float:
-    """Initial standard deviation of a nuisance: its prior, by default `default`; 0 where there is no such nuisance."""
-    standard_deviations = [
-        default if n.sd is None else n.sd for n in nuisances if n.kind == kind and n.output in ("", output)
-    ]
-    return standard_deviations[0] if standard_deviations else 0.0
-
-
-def components_fixed_by_priors(nuisances: Sequence[Nuisance], outputs: Sequence[str]) -> set[tuple[str, str]]:
-    """Those (output, component) that a nuisance states; the rate belongs to the output ""."""
-    fixed: set[tuple[str, str]] = {("", "rate") for n in nuisances if n.kind == "rate" and n.sd is not None}
-    for output in outputs:
-        offset_nuisances = [n for n in nuisances if n.kind == "offset" and n.output in ("", output)]
-        if offset_nuisances and offset_nuisances[0].sd is not None:
-            fixed.add((output, "offset"))
-    return fixed
+def known_sd(nuisances: Sequence[Nuisance], kind: str, output: str = "") -> float | None:
+    """The standard deviation that is stated of a nuisance; 0 where there is no such one, None where it is estimated."""
+    return next((n.sd for n in nuisances if n.kind == kind and n.output in ("", output)), 0.0)
 
 
 NEGLIGIBLE_DRIFT = 1e-3

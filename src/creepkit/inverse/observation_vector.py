@@ -9,7 +9,7 @@ known, padded to the longest test.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -266,12 +266,6 @@ class ObservationVector:
     def count(self) -> int:
         """Number of measured values."""
         return int(self.present.sum())
-
-    def of_tests(self, tests: Sequence[int]) -> ObservationVector:
-        """The observations of some of the tests, by position."""
-        index = list(tests)
-        stored = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("noise", "stated")}
-        return replace(self, **{name: v[index] for name, v in stored.items() if isinstance(v, np.ndarray)})
 
     def with_noise_of(self, other: ObservationVector) -> ObservationVector:
         """The same with the transforms and the noise of other observations of these outputs."""

@@ -15,7 +15,7 @@ from creepkit.inverse.noise_model import (
     OutputNoise,
     Residuals,
     autocorrelated_components,
-    initial_sd,
+    known_sd,
     without_confounded_misfit,
 )
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
@@ -134,13 +134,13 @@ class WorkingNoiseEstimator:
 
     def _offset(self, output: str, transform: OutputTransform) -> float:
         """Where an estimate of the offsets of tests begins."""
-        return initial_sd(self.settings.nuisances, "offset", transform.floor, output)
+        known = known_sd(self.settings.nuisances, "offset", output)
+        return transform.floor if known is None else known
 
     def _likely_rate(self, tests: int) -> float:
         """Where an estimate of the scatter of rates between so many tests begins."""
-        nuisances = [n for n in self.settings.nuisances if n.kind == "rate"]
-        known = [n for n in nuisances if n.sd is not None or tests >= MINIMUM_TESTS]
-        return initial_sd(known, "rate", ASSUMED_RATE_SD)
+        known = known_sd(self.settings.nuisances, "rate")
+        return ASSUMED_RATE_SD * (tests >= MINIMUM_TESTS) if known is None else known
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
         """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.

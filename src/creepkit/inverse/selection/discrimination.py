@@ -89,14 +89,15 @@ def under_common_covariance(
 
 def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     """A law's residuals, with the derivatives that make the covariance, of the best law."""
-    offset_sensitivity, rate_effect = (
-        np.where(reference.present, reference_values, own_values)
-        for reference_values, own_values in (
-            (reference.offset_sensitivity, residuals.offset_sensitivity),
-            (reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
-        )
+
+    def best(of_best: Floats, own: Floats) -> Floats:
+        return np.where(reference.present, of_best, own)
+
+    return replace(
+        residuals,
+        offset_sensitivity=best(reference.offset_sensitivity, residuals.offset_sensitivity),
+        log_rate_sensitivity=best(reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
     )
-    return replace(residuals, offset_sensitivity=offset_sensitivity, log_rate_sensitivity=rate_effect)
 
 
 def score_under_own_covariance(fit: Identification, linearised: LinearisedProblem, frames: float) -> float:

@@ -32,11 +32,11 @@ from scipy.special import ndtr
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel
+from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, known_sd
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, scaled_inverse
-from creepkit.records import History, Nuisance
+from creepkit.records import History
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
 """Of ln rate: what is usual of each level, u."""
@@ -383,7 +383,7 @@ def rate_scatter(
         precision=0.5 * (precision + precision.T),
         gradient=gradient,
         common=_common_members(problem.histories),
-        known=_known_sd(problem.settings.nuisances),
+        known=known_sd(problem.settings.nuisances, "rate"),
         stresses=problem.conditions[0],
         temperatures=problem.conditions[1],
         errors=errors,
@@ -426,11 +426,3 @@ def unstated_member_notes(histories: Sequence[History]) -> list[str]:
             assumed = f"{one} of {level} {common[level]}, as the others are" if level in common else own
             notes.append(f"{tests} no {level}: taken for {assumed}")
     return notes
-
-
-def _known_sd(nuisances: Sequence[Nuisance]) -> float | None:
-    """The standard deviation of the rate where a nuisance gives it; 0 without such a nuisance; else None."""
-    for nuisance in nuisances:
-        if nuisance.kind == "rate":
-            return nuisance.sd
-    return 0.0
