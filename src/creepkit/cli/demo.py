@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -98,27 +97,9 @@ def _run(data: Path, folder: Path) -> StudyResult:
         raise FitError(f"{failure.stage}: {failure.sentence}")
     ranking = result.rankings[""]
     tell(answer_text(ranking.best, ranking, "report.html"))
-    if data == MEASURED:
-        _print_rupture_times(ranking.best)
-    else:
+    if data == PLANTED_BULGE:
         _print_truth(data, ranking.best)
     return result
-
-
-def _print_rupture_times(fit: Identification) -> None:
-    """Rupture times of each condition, measured and predicted."""
-    rupture_by_condition: dict[str, list[Any]] = {}
-    for test_fit, test in zip(fit.tests, fit.histories, strict=True):
-        if test_fit.rupture is not None:
-            rupture_by_condition.setdefault(test.condition, []).append(test_fit.rupture)
-    rows = []
-    for condition in sorted(rupture_by_condition, reverse=True):
-        comparisons = rupture_by_condition[condition]
-        measured = ", ".join(f"{'> ' if c.censored else ''}{c.measured / 3600:.4g}" for c in comparisons)
-        one = comparisons[0]
-        interval = f"{one.low / 3600:.0f} to {one.high / 3600:.0f}"
-        rows.append((condition, measured, f"{one.predicted / 3600:.0f}", interval))
-    _print_rows(("rupture at", "measured, h", "predicted, h", "95 % interval of one test, h"), rows)
 
 
 def _print_truth(folder: Path, fit: Identification) -> None:
@@ -134,10 +115,5 @@ def _print_truth(folder: Path, fit: Identification) -> None:
         sds = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
         rows.append(("rate between tests", *sds, "", ""))
     tell(f"the truth: {truth['law']}")
-    _print_rows(("parameter", "true", "identified", "95 % interval", "inside"), rows)
-
-
-def _print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table without rules: one line a row."""
-    for line in aligned(columns, rows):
+    for line in aligned(("parameter", "true", "identified", "95 % interval", "inside"), rows):
         tell(f"  {line}")

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from creepkit.cli.command_options import OutputPath
+from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.reports.terminal import ProgressBar, print_json, print_table, tell
 
 if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
     from creepkit.studies.result import StudyResult
 
 MOST_FIGURES = 10
@@ -85,6 +87,20 @@ def print_result(result: StudyResult) -> None:
         tell(as_text([table_of_groups({name: (one.best, one.decisive) for name, one in rankings.items()})]))
     if result.report is not None:
         tell(f"report: {result.report}")
+    if rankings and result.folder is not None:
+        path = result.folder / ("ranking.json" if len(rankings) == 1 else f"{next(iter(rankings))}_ranking.json")
+        tell(f"laws: {path}; forecast: creepkit predict {path} {_test_as_options(next(iter(rankings.values())).best)}")
+
+
+def _test_as_options(fit: Identification) -> str:
+    """A test like those that a law was identified from, as options of `creepkit predict`; TESTS where not of bars."""
+    from creepkit.reports.next_steps import are_bars
+
+    if not are_bars(fit):
+        return "TESTS"
+    point, end = fit.tested_point, fit.ranges["time"][1] / SECONDS_PER_HOUR
+    temperature = f" --temperature-c {point.temperature - ZERO_CELSIUS:.0f}"
+    return f"--stress {point.stress:.3g}{temperature} --end-h {end:.3g}"
 
 
 def result_to_json(result: StudyResult) -> dict[str, object]:

@@ -99,11 +99,12 @@ def show(
 
 
 def read_results(path: Path, histories: Sequence[History] = ()) -> Identification | Ranking:
-    """A saved identification or ranking, with the tests that it was made from where they are given."""
+    """A saved identification or ranking, or that of a folder, with the tests that it was made from where given."""
     import creepkit as ck
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
 
+    path = _result_in(path) if path.is_dir() else path
     found = ck.load(path)
     if not isinstance(found, Identification | Ranking):
         raise FitError(
@@ -111,6 +112,17 @@ def read_results(path: Path, histories: Sequence[History] = ()) -> Identificatio
         )
     kept: Identification | Ranking = with_tests(found, histories)
     return kept
+
+
+def _result_in(folder: Path) -> Path:
+    """The one ranking, or identification, that identify or run wrote into a folder; FitError for none or several."""
+    folders = [one for one in (folder, folder / "identified", *folder.glob("*.results/identified")) if one.is_dir()]
+    found = [file for one in folders for file in sorted(one.glob("*ranking*.json"))]
+    found = found or [file for one in folders if one.name == "identified" for file in sorted(one.glob("*.json"))]
+    if len(found) != 1:
+        listed = ", ".join(map(str, found[:4])) or "none; run 'creepkit run' or 'creepkit identify' there first"
+        raise FitError(f"{folder}: name the identification in it (found: {listed})")
+    return found[0]
 
 
 def with_tests(result: Any, histories: Sequence[History]) -> Any:

@@ -60,8 +60,8 @@ class NumericalError:
         """For people: what differed, by how much, and what it would have done to the values."""
         sizes = ", ".join(f"{size:.2g} {output_unit(name)}".strip() + f" in {name}" for name, size in self.size.items())
         return (
-            f"at the optimum {self.predictor} differs from {self.refined} by {sizes} (rms; at most {self.noises:.2g} "
-            f"noises). This is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
+            f"at the optimum {self.predictor} differs from {self.refined} by {sizes} (rms); at most {self.noises:.2g} "
+            f"noises. This is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
             + "deviations"
             + (f"; {', '.join(self.incomplete)} could not be corrected" if self.incomplete else "")
             + ("; a further correction may move them again" if not self.settled else "")

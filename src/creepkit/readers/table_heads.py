@@ -122,10 +122,10 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     at = _row_of_names(table, known)
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
     rest = enumerate(table.rows[at + 1 :], at + 1)
-    first = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
-    widest = max((row.cells for row in table.rows[at:first]), key=len)
-    frames = with_commas_of_remarks(table, table.rows[first:], widest)
-    table = replace(table, rows=[*table.rows[:first], *frames])
+    end = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
+    widest = max((row.cells for row in table.rows[at:end]), key=len)
+    frames = with_commas_of_remarks(table, table.rows[end:], widest)
+    table = replace(table, rows=[*table.rows[:end], *frames])
     numbered = [name for k, name in enumerate(table.rows[at].cells) if _numbers_readings(table, at, k, known)]
     table = table.assuming(*(f"'{quoted(name, 40)}' numbers the readings" for name in numbered))
     table = without_ignored(_with_comments(table, line, known), at, (*vocabulary.ignored, *numbered))

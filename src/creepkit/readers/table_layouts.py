@@ -539,8 +539,9 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
     """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
     for k, row in enumerate(table.rows):
-        after = table.rows[k + 1 : k + 2]
-        if k < 2 or not _is_remark(row, table) or any(_begins_again(table.rows[k - 1], one, table) for one in after):
+        after = (one for one in table.rows[k + 1 : k + 6] if not _is_remark(one, table))
+        is_frame_row = k < 2 or not _is_remark(row, table)
+        if is_frame_row or any(_begins_again(table.rows[k - 1], one, table) for one in [*after][:1]):
             frames.append(row)
             continue
         text = " ".join(filter(None, row.cells))

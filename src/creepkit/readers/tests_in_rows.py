@@ -46,6 +46,7 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import TABLE_SUFFIXES, TEXT_SUFFIXES
+from creepkit.readers.matrix_of_tests import one_row_a_test
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
@@ -64,7 +65,7 @@ _ROUNDING = 0.01
 def tables_of(path: Path) -> list[CellTable]:
     """The cells of a text file, or of the sheets of a spreadsheet."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
-    return read_sheets(path) if is_spreadsheet else [read_text_table(path)]
+    return [one_row_a_test(one) for one in (read_sheets(path) if is_spreadsheet else [read_text_table(path)])]
 
 
 @dataclass(frozen=True)
@@ -83,12 +84,14 @@ class RowPerTestReader:
             return False
         if is_text:
             table = peek_table(path)
-            return table is not None and self._is_table(table)
+            return table is not None and self._is_table(one_row_a_test(table))
         try:
             sheets = read_sheets(path)
         except HistoryError:
             return False
-        return any(map(self._is_table, sheets)) and not any(holds_frames(sheet, self.vocabulary) for sheet in sheets)
+        return any(map(self._is_table, map(one_row_a_test, sheets))) and not any(
+            holds_frames(sheet, self.vocabulary) for sheet in sheets
+        )
 
     def _is_table(self, table: CellTable) -> bool:
         names = self.vocabulary.synonyms

@@ -24,15 +24,28 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
-from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
+from creepkit.reports.blocks import (
+    MOST_NAMED,
+    Answer,
+    Rich,
+    Table,
+    as_text,
+    ends,
+    listed,
+    named,
+    number,
+    plural,
+    printable,
+)
 from creepkit.reports.description import tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST
+from creepkit.reports.words import ALL_DIGITS, BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
+    from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
@@ -55,6 +68,10 @@ MOST_ASKED = 4
 
 OTHER_EXPONENT = 0.1
 """Of the stress exponent, by which a value called n differs from it where this is said."""
+
+
+OTHER_MEDIAN = 0.05
+"""Of a time, by which that of the law's values differs from it where this is said."""
 
 
 LEAST_WEIGHT = 0.01
@@ -125,7 +142,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    by_tests = f"{measured:.2g} by minimum rates" if math.isfinite(measured) else ""
+    over = ends([one.stress for one in rates], 3) if rates else ""
+    by_tests = f"{measured:.2g} by minimum rates over {over} MPa" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
         by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
@@ -188,9 +206,11 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
 def time_figure(one: TimeForecast) -> KeyFigure:
     """When something comes; of a measured test whether it did within its interval."""
     inside = {True: "inside", False: "outside", None: ""}[one.inside]
-    said = f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}" * math.isfinite(one.measured)
+    said = [f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}"] * math.isfinite(one.measured)
+    if math.isfinite(one.value) and abs(one.value - one.median) > OTHER_MEDIAN * one.median:
+        said.append(FORECAST["by values"].format(hours=hours_number(one.value)))
     hours = (one.median, one.low, one.high)
-    return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", said)
+    return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", "; ".join(said))
 
 
 def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
@@ -289,24 +309,32 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         return
     if adequacy.unpredicted:
         yield CAUTIONS["unpredicted"].format(tests=named(adequacy.unpredicted, "test"))
-    if adequacy.contradicting is not None:
-        yield CAUTIONS["contradicting"]
-    if adequacy.is_explained and not adequacy.lies_in_tests:
-        yield adequacy.explanations[0].headline
+    for k, reason in enumerate(_reasons(fit, adequacy)):
+        yield reason if k else CAUTIONS["rejected"].format(reason=reason)
     if adequacy.mentioned is not None:
         yield adequacy.mentioned.caution
     if adequacy.remedies and not adequacy.explanations:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
+    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
+    if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
+        yield CAUTIONS["noise unknown"]
+
+
+def _reasons(fit: Identification, adequacy: Adequacy) -> list[str]:
+    """Why the tests reject the law; none where they do not, or where what it misses lies in some of them."""
+    if not adequacy.rejects or adequacy.lies_in_tests:
+        return []
+    found = [REASONS["two exponents"]] * (adequacy.contradicting is not None)
+    if adequacy.is_explained:
+        found.append(REASONS["cause"].format(cause=adequacy.explanations[0].headline))
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
         factor, unit = (100.0, "% (absolute)") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
         what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
         side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
         kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
-        yield CAUTIONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at)
-    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
-    if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield CAUTIONS["noise unknown"]
+        found.append(REASONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at))
+    return found or [REASONS["noise"]]
 
 
 def _test(fit: Identification, name: str) -> str:
@@ -388,7 +416,7 @@ def answer(
         next_step(fit, ranking, searched),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
-        units=f"{Answer.units}{other}",
+        units=f"{Answer.units}{other}; {ALL_DIGITS}",
         **page,
     )
 
@@ -414,9 +442,7 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
         choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
         rows.append((name, titled_law(fit.law), *numbers, f"{said}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
-    caption = (
-        "in brackets: 95 % intervals; of a law that the tests contradict the measured stress exponent, and no rate"
-    )
+    caption = "in brackets: 95 % intervals; of a law that the tests reject the measured stress exponent, and no rate"
     return Table(caption, columns, rows, numeric=(2, 3, 4))
 
 
@@ -454,8 +480,8 @@ def symbols_of(law: CreepLaw) -> dict[str, Rich]:
 
 
 def value_cells(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
-    """A value and the ends of its 95 % interval, as every table shows them."""
-    return f"{estimate.value:.5g}", " to ".join(interval_ends(law, estimate))
+    """A value with the digits that the law needs, and the ends of its 95 % interval, as every table shows them."""
+    return f"{estimate.value:.10g}", " to ".join(interval_ends(law, estimate))
 
 
 def unit_text(unit: str) -> str:

@@ -195,10 +195,26 @@ def printable_lines(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """A text with a capital and a full stop; names stay as they are."""
-    text = printable(text).strip()
+    """A text with a capital and a full stop; names stay as they are. Clauses of a long one are sentences themselves."""
+    said: list[str] = []
+    for clause in _CLAUSES.split(printable(text).strip()):
+        joined = "; ".join([*said[-1:], clause])
+        fits = max(len(one.split()) for one in _ENDS.split(joined)) <= MOST_WORDS
+        said[-1:] = [joined] if fits or not said else [said[-1], clause]
+    return " ".join(map(_with_ends, said))
+
+
+def _with_ends(text: str) -> str:
     first = text[:1] if _NAME.match(text) else text[:1].upper()
     return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?', ':', '…')) else '.'}"
+
+
+MOST_WORDS = 25
+"""Of a sentence that need not have more."""
+
+
+_CLAUSES, _ENDS = re.compile(r"; (?![^(\[{]*[)\]}])"), re.compile(r"(?<=[.!?:])\s+")
+"""Before a clause that is not in brackets; and where a sentence ends, or what it says first."""
 
 
 def plural(count: int, noun: str) -> str:

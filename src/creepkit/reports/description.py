@@ -117,12 +117,10 @@ def _truth(fit: Identification) -> str:
         kind = "not judged"
     elif adequacy.explains:
         kind = "explains"
-    elif adequacy.is_explained:
-        return TRUTHS["explained"].format(cause=adequacy.explanations[0].headline)
-    elif adequacy.contradicting is not None:
-        kind = "two exponents"
+    elif adequacy.lies_in_tests:
+        return TRUTHS["in tests"].format(cause=adequacy.explanations[0].headline)
     else:
-        kind = "shape" if adequacy.misses_shape() else "noise"
+        kind = "rejected"
     return TRUTHS[kind]
 
 

@@ -156,7 +156,7 @@ def _remarks(test: TestForecast) -> Iterator[str]:
     if shares := end_shares(next(iter(test.outputs.values()), None)):
         parts = ", ".join(f"{part} {100 * share:.0f} %" for part, share in shares.items())
         yield f"shares of the variance at its end, to first order: {parts}"
-    yield from filter(None, (test.extrapolation, test.caution, *test.notes))
+    yield from filter(None, (test.extrapolation.replace("), ", "); "), test.caution, *test.notes))
 
 
 def _figures(test: TestForecast) -> Iterator[KeyFigure]:

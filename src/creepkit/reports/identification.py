@@ -291,7 +291,7 @@ def _sums(fit: Identification) -> list[str]:
 
 def _if_the_law_holds(fit: Identification) -> str:
     """The condition of intervals of single tests."""
-    return ", which they do not have: the tests contradict the law" if rejected(fit) else ", if the law holds"
+    return ", which they do not have: the tests reject the law" if rejected(fit) else ", if the law holds"
 
 
 def _without_misfit(fit: Identification) -> list[str]:

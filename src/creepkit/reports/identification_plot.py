@@ -53,8 +53,8 @@ PANEL_WIDTH, PANEL_HEIGHT = 4.1, 3.4
 """Inches of a panel of an answer: so small that a telephone shows it as it was drawn."""
 
 
-LABEL_DISTANCE = 9.0
-"""Points between labels at the least; of those that would cover one another the first stands."""
+LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), ((2.0, -3.0), (-19.0, 1.0), (2.0, 6.0))
+"""Points of a label, and where it may stand beside the end of its curve; one that would cover others is left out."""
 
 
 MOST_LABELLED = 16
@@ -130,9 +130,11 @@ def _draw_leading(
     """
     output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
     _draw_curves(axes, fit, fitted_curves(fit), output, tests, scale.colours)
-    axes.set_title("measured (dots) and by the law (lines, 95 % band)", fontsize=9)
     by_stress = stress_scale(fit.histories, fit.predictor)
-    if scale.label != by_stress.label and len(tests) <= MOST_LABELLED:
+    labelled = scale.label != by_stress.label and len(tests) <= MOST_LABELLED
+    beside = f"; beside them {by_stress.label.rpartition(' ')[2]}" * labelled
+    axes.set_title(f"dots: measured; lines: by the law, 95 %{beside}", fontsize=9)
+    if labelled:
         _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
     if bar and np.ptp(scale.values) > 0:
         scale.add_bar(axes)
@@ -148,13 +150,12 @@ def _label_stresses(
         known = points[np.isfinite(points).all(axis=1)]
         if known.size:
             place = (float(known[-1, 0]), float(known[-1, 1]))
-            pixels = axes.transData.transform(place) * 72.0 / axes.figure.dpi
-            if any(np.linalg.norm(pixels - one) < LABEL_DISTANCE for one in shown):
-                continue
-            shown.append(pixels)
-            axes.annotate(
-                f"{stresses[k]:.3g}", place, (2, -3), textcoords="offset points", fontsize=8, color=colours[k]
-            )
+            end = axes.transData.transform(place) * 72.0 / axes.figure.dpi
+            free = [one for one in LABEL_PLACES if all((abs(end + one - o) > LABEL_SIZE).any() for o in shown)]
+            for offset in free[:1]:
+                shown.append(end + offset)
+                text = {"textcoords": "offset points", "fontsize": 8, "color": colours[k]}
+                axes.annotate(f"{stresses[k]:.3g}", place, offset, **text)
 
 
 def draw_curve(

@@ -239,21 +239,21 @@ def _comparison(found: ReportGroup, cite: Callable[..., str]) -> Iterator[str]:
     yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
     yield "Each parameter costs 2 ln of the factor by which the tests narrow its bounds."
     yield f"The weight of a law is exp(-difference / 2) over the sum of all; it is credible above {CREDIBLE_WEIGHT:g}."
-    yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not contradict it."
+    yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not reject it."
     yield "Nor may a share of another law, or an effect that was not modelled, change that."
 
 
 def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Iterator[str]:
-    """How it was judged whether the tests contradict a law; none where it was not."""
+    """How it was judged whether the tests reject a law; none where it was not."""
     judged = [fit.adequacy for fit in fits if fit.adequacy is not None]
     if not judged:
         return
     noise = "noise that was stated or estimated without it"
-    yield f"Tests contradict a law whose chi-square against {noise} has a probability below {100 * SIGNIFICANCE:g} %."
+    yield f"Tests reject a law whose chi-square against {noise} has a probability below {100 * SIGNIFICANCE:g} %."
     if any(len(one.outputs) > 1 for one in judged):
         yield "It is the least of those of all outputs and of each one, times their number."
     largest = number(math.exp(LARGEST_RATE_SCATTER), 2)
-    yield f"They contradict it, too, where rates of tests scatter by more than a factor of {largest}."
+    yield f"They reject it, too, where rates of tests scatter by more than a factor of {largest}."
     yield "So do they where a changing exponent or energy, one test, or two groups explain scatter six times better."
     if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
         freedom = f"{FREEDOM_PER_FRAME:g} degrees of freedom each"

@@ -35,7 +35,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     if adequacy is not None and adequacy.rejects:
         if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])
-        kind = "laws" if len(laws) < 2 else "search laws" if _are_bars(fit) else "within"
+        kind = "laws" if len(laws) < 2 else "search laws" if are_bars(fit) else "within"
         return NEXT["within" if searched else kind]
     if adequacy is not None and adequacy.verdict == "cannot be judged" and adequacy.not_judged != (RUPTURE_OUTPUT,):
         stated = [one for one in adequacy.not_judged if one != RUPTURE_OUTPUT] or ["strain"]
@@ -106,7 +106,7 @@ def further_test(fit: Identification, other: Identification | None) -> tuple[flo
     that between the laws. It takes no longer than LONGER times the longest test until the strain of the reference
     point. None of tests other than bars, and where the laws differ by less than SEPARATE standard deviations.
     """
-    if not _are_bars(fit):
+    if not are_bars(fit):
         return None
     low, high = fit.ranges["stress"]
     kelvin = sorted({round(T, 1) for one in fit.histories for T in held_temperatures(one)})
@@ -129,7 +129,7 @@ def further_test(fit: Identification, other: Identification | None) -> tuple[flo
     return float(stress[k]), float(T[k]), float(hours[k]), float(factor[k])
 
 
-def _are_bars(fit: Identification) -> bool:
+def are_bars(fit: Identification) -> bool:
     """Whether all tests are creep curves of bars."""
     return bool(fit.histories) and all(
         "strain" in one.outputs and one.loading.quantity == "stress" for one in fit.histories

@@ -13,7 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, listed, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
 from creepkit.reports.description import Description, spread_text
@@ -24,6 +24,7 @@ from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.terminal import print_table, tell, tell_written
+from creepkit.reports.words import COMPARED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,10 +35,8 @@ if TYPE_CHECKING:
     from creepkit.reports.svg import PageFigures
 
 
-CHI_SQUARE_NOTE = (
-    "chi-square is that of all values under one estimated covariance, by which laws are compared. The reduced "
-    "chi-square of a verdict is that over the noise of the readings alone"
-)
+MOST_BEHIND, SMALLER = 3, 0.95
+"""Laws behind the best of which it is said why, though their misfits are smaller; and by which factor on its own."""
 
 
 def ranking_text(ranking: Ranking) -> str:
@@ -52,8 +51,9 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
 
     of : the material, " of CMSX-4".
     """
-    blocks: list[Block] = [_table(ranking)]
-    blocks += [Paragraph(CHI_SQUARE_NOTE, "note")] if any(math.isfinite(one.chi_square) for one in ranking.laws) else []
+    blocks: list[Block] = [_table(ranking), Items(_behind(ranking))]
+    if any(math.isfinite(one.chi_square) for one in ranking.laws):
+        blocks.append(Paragraph(COMPARED["chi-square"], "note"))
     if ranking.challenges:
         blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
     if ranking.failed:
@@ -86,6 +86,23 @@ def _table(ranking: Ranking) -> Table:
     ]
     columns = ("law", "parameters", "mean misfit", "test to test", "behind", "weight", "chi-square", "by the noise")
     return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
+
+
+def _behind(ranking: Ranking) -> list[str]:
+    """Why laws that have a smaller misfit than the best are behind it, a sentence each."""
+    best, found = ranking.laws[0], list[str]()
+    own = Description.of(best.fit)
+    for one in ranking.laws[1:]:
+        theirs = dict(Description.of(one.fit).items())
+        smaller = [name for name, misfit in own.items() if theirs.get(name, math.inf) < SMALLER * misfit]
+        more = one.chi_square - best.chi_square
+        kind = "parameters" if not more > 0 else "readings"
+        if not math.isfinite(one.excess):
+            kind = "left out" if one.fit.law.name in ranking.further else "unpredicted"
+        if smaller and not one.same_as and (kind != "readings" or math.isfinite(more)):
+            values = {"law": one.fit.law.name, "what": listed(smaller)}
+            found.append(COMPARED[kind].format(**values, more=number(more, 2), excess=number(one.excess, 2)))
+    return found[:MOST_BEHIND]
 
 
 def equivalents_among_remaining(ranking: Ranking) -> list[str]:

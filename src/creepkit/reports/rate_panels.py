@@ -15,6 +15,7 @@ from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
+from creepkit.reports.blocks import ends
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
 
@@ -253,7 +254,8 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     measured, _, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
-    return f"stress exponent: {measured:.2g} measured, {predicted:.2g} by the law"
+    over = ends([one.stress for one in rates], 3)
+    return f"exponent, {over} MPa: {measured:.2g} measured, {predicted:.2g} by the law"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------
@@ -307,4 +309,4 @@ def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
     axes.set_ylim(len(fits) - 0.5, -0.5)
     axes.set(xlabel=f"creep rate at {stress:.3g} MPa and {100 * strain:.2g} % strain, %/h")
-    place_legend(axes, "law; open:\ncontradicted\nby its tests")
+    place_legend(axes, "law; open:\nrejected\nby its tests")

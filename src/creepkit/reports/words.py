@@ -11,9 +11,9 @@ HEADLINES = {
     "use": "use {law} for {good}; {truth}",
     # some of it is, some is not
     "use in part": "use {law} for {good}, not {bad}; {truth}",
-    # everything is, but the tests contradict the law
+    # everything is, but the tests reject the law
     "between": "use {law} between the tests only, for {good}; {truth}",
-    # some is, and they contradict it
+    # some is, and they reject it
     "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
     # nothing is
     "use nothing": "do not use {law}: it misses {bad}; {truth}",
@@ -27,17 +27,13 @@ HEADLINES = {
 
 TRUTHS = {
     # no noise is stated, and too few readings show it
-    "not judged": "whether it is true cannot be judged",
+    "not judged": "whether it is true is unknown",
     # the p-value is 0.3 % or more
-    "explains": "the tests do not contradict it",
-    # rates contradict it, and one cause explains them best (its sentence follows)
-    "explained": "{cause}",
-    # a law of creep and rupture misses both, in opposite ways
-    "two exponents": "by it minimum rates contradict rupture times",
-    # it misses curves, but not only by their rate
-    "shape": "curves differ in shape",
-    # any other contradiction
-    "noise": "the tests differ from it by more than their noise",
+    "explains": "the tests do not reject it",
+    # what it misses lies in single tests, or in two groups of them (their sentence follows)
+    "in tests": "{cause}",
+    # any other misfit beyond the noise; why stands in the first caution
+    "rejected": "the tests reject it",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
@@ -48,15 +44,11 @@ CAUTIONS = {
     # the search did not converge
     "not converged": "the search did not end: these values may not be its best",
     # an answer from a file says nothing of it
-    "unknown": "whether the tests contradict the law is not known",
+    "unknown": "whether the tests reject the law is not known",
+    # they do; why follows, the first of REASONS that holds
+    "rejected": "the tests reject it as the exact law: {reason}",
     # a simulation ends before a reading, or gives no number
     "unpredicted": "it does not predict every reading of {tests}",
-    # as in the first line
-    "contradicting": "minimum rates and rupture times of the tests contradict one another by this law",
-    # it misses curves: where its misfit is largest in noises
-    "worst": "it is worst in {test}: {what} {amount} too {side} at {time}",
-    # the same, where its strain runs away before the test's
-    "runs away": "it is worst in {test}: by the law it has broken by {time}",
     # a thickness, offset or drift of usual size takes the contradiction away
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
     # a nuisance lies three standard deviations from what was stated
@@ -77,6 +69,21 @@ CAUTIONS = {
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
 """{kind: a caution}, the most serious first."""
+
+
+REASONS = {
+    # a law of creep and rupture misses both, in opposite ways
+    "two exponents": "by it minimum rates contradict rupture times",
+    # rates reject it, and one cause explains them best (its sentence follows)
+    "cause": "{cause}",
+    # it misses curves, but not only by their rate: where its misfit is largest in noises
+    "worst": "the {what} of {test} is {amount} too {side} at {time}",
+    # the same, where its strain runs away before the test's
+    "runs away": "by it {test} has broken by {time}",
+    # any other
+    "noise": "they differ from it by more than their noise",
+}
+"""{kind: why the tests reject a law}; of several the others are cautions of their own."""
 
 
 NEXT = {
@@ -119,11 +126,30 @@ BRACKETS = (
 """Below the numbers of an answer."""
 
 
+ALL_DIGITS = "all digits: details, files"
+"""Behind the values of a law, which have four there."""
+
+
 CONSTANT_LOAD = (
     "under a constant load the true stress rises with strain, here by up to {growth}: "
     "the interval of the stress exponent rests on the form of the law too"
 )
 """Beside the exponent of such tests."""
+
+
+COMPARED = {
+    # a law with a smaller misfit than the best, and why it is behind
+    "readings": "{law} has the smaller misfit of {what}, but its chi-square over all readings is {more} higher",
+    # its chi-square is not higher
+    "parameters": "{law} has the smaller misfit of {what}, but its parameters cost more ({excess} behind)",
+    # nobody asked for it
+    "left out": "{law} has the smaller misfit of {what}, but nobody asked for it, and it predicts left-out tests worse",
+    # it gives no number for some readings
+    "unpredicted": "{law} has the smaller misfit of {what}, but does not predict every test",
+    # below their table
+    "chi-square": "chi-square is that of all values under one estimated covariance, a verdict's over the noise alone",
+}
+"""{kind: what is said of laws that were compared}."""
 
 
 RUPTURE = {
@@ -160,8 +186,8 @@ FORECAST = {
     "within": "within the tests",
     # outside them
     "beyond": "extrapolated beyond the tests in {quantities}",
-    # its end, where they contradict the law
-    "contradicted": ", by a law that the tests contradict",
+    # its end, where they reject the law
+    "contradicted": ", by a law that the tests reject",
     # always
     "by": "by {laws}; in brackets {level} intervals of a single test, {right}",
     # its end, of one law
@@ -174,6 +200,8 @@ FORECAST = {
     "some beyond": "{count} of them extrapolated beyond the tests",
     # a caution
     "outside": "what was measured of {tests} lies outside its band or interval",
+    # beside a time, where the law's curve reaches it at another
+    "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a contradicted law
     "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals allow for {here} here",
     # one lies outside
@@ -181,7 +209,7 @@ FORECAST = {
     # it is extrapolated
     "next beyond": "make a test nearer to it (creepkit design)",
     # the law is contradicted
-    "next contradicted": "look for a law that the tests do not contradict (creepkit identify TESTS --search)",
+    "next contradicted": "look for a law that the tests do not reject (creepkit identify TESTS --search)",
     # the largest part is none of the law's
     "next fixed": "plan with the interval: most of it is {part}, which no further test makes smaller",
     # none of these
@@ -198,7 +226,7 @@ DESIGN = {
     # none with 0.2 or more
     "hopeless": "no test is likely to decide between the laws; the best, {test}, does with probability {probability}",
     # as it says
-    "contradicted": "no test is proposed: the tests contradict {law}, the best law",
+    "contradicted": "no test is proposed: the tests reject {law}, the best law",
     # as it says
     "one law": "no test is proposed: {law} remains alone, and nothing is to be told apart from it",
     # all are left out
@@ -218,7 +246,7 @@ DESIGN = {
     # a test is proposed
     "next make": "make it, then identify the law again with its file (creepkit identify)",
     # none is
-    "next contradicted": "find a law that the tests do not contradict, or design for the values (--goal parameters)",
+    "next contradicted": "find a law that the tests do not reject, or design for the values (--goal parameters)",
     # none is
     "next one law": "design for the values, or for a rate or an exponent (--goal parameters, rate, exponent)",
     # none can be made

@@ -59,7 +59,7 @@ class StudyResult:
     """What a run of a study gave: ordinary records, by group of tests or by name.
 
     file : the study. inputs : its tests. files : that were read. exclusions : what was left out. stages : how each
-    ended, and results : {stage: its result}. report : the page, where one was asked for.
+    ended, and results : {stage: its result}. report : the page, where one was asked for. folder : of `identified`.
     extractions, imposed : {test of a camera: what its frames gave, and what its instrument recorded}.
     documents : {stage: its result as JSON-able data, which other commands read}.
     """
@@ -70,6 +70,7 @@ class StudyResult:
     exclusions: tuple[Exclusion, ...]
     stages: tuple[StageRecord, ...]
     report: Path | None = None
+    folder: Path | None = None
     results: Any = field(default_factory=dict, repr=False)
     extractions: Mapping[str, Extraction] = field(default_factory=dict, repr=False)
     imposed: Mapping[str, Imposed] = field(default_factory=dict, repr=False)

@@ -190,6 +190,7 @@ class _Run:
             extractions=extractions,
             imposed={name: under for name, _, under in of_cameras if under is not None},
             documents=execution.documents,
+            folder=self.kept.identified,
         )
         self.kept.write_identified(result.identified)
         for stage in stages:

@@ -113,8 +113,10 @@ def test_a_planned_bar_is_forecast_as_in_python(saved):
 def test_targets_of_a_dimple(saved):
     folder, _ = saved
     words = "--pressure 8 --end-h 0.5 --temperature-c 850 --modulus-gpa 150 --target amplitude=0.05,0.06"
-    result = creepkit(f"predict {folder / 'ranking.json'} {words}")
+    result = creepkit(f"predict {folder} {words}")  # the ranking in a folder
     assert result.exit_code == 0, result.output
+    empty = creepkit(f"predict {folder.parent} {words}")
+    assert "name the identification in it (found: none; run" in empty.output
     assert "time to amplitude 0.05 mm " in result.stdout
     assert "time to amplitude 0.06 mm:" in result.stdout
 

@@ -210,3 +210,21 @@ def test_a_test_without_frames_reads_back(tmp_path, known):
 def test_a_rate_beside_frames_reads_back(tmp_path):
     test = History("A1", np.array([1.0, 2.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, minimum_rate=2e-9)
     assert ck.read_histories(write_history(test, tmp_path / "A1.csv"))[0].minimum_rate == 2e-9
+
+
+def test_a_matrix_of_rupture_times_is_one_test_a_cell(tmp_path):
+    """Temperatures by stresses as data sheets print them, in two languages, and in sheets of two heats."""
+    expected = [(550, 235, 20.3, None), (550, 196, 132.3, None), (550, 177, None, 6e4), (600, 196, None, 11.9)]
+    for head in (
+        "Creep rupture data, heat B7 (h);;;\nTemperature (C);235 MPa;196 MPa;177 MPa",
+        "Bruchzeit in h, Charge B7;;;\nTemperatur [°C];Spannung [MPa];;\n;235;196;177",
+    ):
+        tests = read(tmp_path, f"{head}\n550;20.3;132.3;(60000)\n600;-;>11.9;-\n")
+        for test, (celsius, stress, broke, lasted) in zip(tests, expected, strict=True):
+            found = (test.temperature - 273.15, test.loading.steps[0][1], test.times[-1] / 3600.0)
+            assert found == pytest.approx((celsius, stress, broke or lasted)), head
+            assert (test.unruptured, test.labels["heat"]) == (broke is None, "B7"), head
+    head = [["Test temp. (°C)", "Time to rupture (h) at stress (MPa) of"], [None, 235, 196], [550, 20.3, "(60000)"]]
+    sheets = {f"Heat {heat}": [[f"Creep rupture data, Heat {heat}"], *head] for heat in ("AAA", "AAB")}
+    tests = ck.read_histories(workbook(tmp_path / "matrix.xlsx", sheets))
+    assert [(one.labels["heat"], one.unruptured) for one in tests[1:3]] == [("AAA", True), ("AAB", False)]

@@ -187,7 +187,7 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
             blocks += strength_blocks(assessment)
     else:
         title = f"Creep rates of {plural(len(found), 'material')}"
-        caption = f"{title}, by law, with 95 % intervals; open marks: the tests contradict the law."
+        caption = f"{title}, by law, with 95 % intervals; open marks: the tests reject the law."
         drawn = [(one.name, one.fit) for one in _by_law(found)]
         said = [(contents.forecast_groups.get(name, name), one) for name, one in contents.forecasts.items()]
         blocks.append(Items([f"{group}: {figure.line}" for group, one in said for figure in asked_figures(one)]))
@@ -227,7 +227,7 @@ def _overview(contents: ReportContents) -> str:
     decided = f" The choice of the law is decisive in {decisive} of {len(compared)}." if compared else ""
     return (
         f"Laws were identified of {len(found)} of {plural(len(contents.groups), 'material')}. The best law is {named}. "
-        f"The tests do not contradict it at their noise in {explained} of {len(found)}.{decided}"
+        f"The tests do not reject it at their noise in {explained} of {len(found)}.{decided}"
     )
 
 

@@ -61,22 +61,10 @@ def test_the_planted_law_is_singled_out_and_what_constant_loads_allow_beside_it_
     assert ranking.laws[0].chi_square == pytest.approx(120 - 3, abs=3 * np.sqrt(2 * 120))
 
 
-def test_its_values_lie_within_three_standard_errors(ranking):
-    table = ranking.best.law.table
-    for e, true in zip(ranking.best.estimates, (5e-16, 4.0, -0.4), strict=True):
-        value, low, high = (table[e.name].to_internal(v) for v in (e.value, e.low, e.high))
-        assert table[e.name].to_internal(true) == pytest.approx(value, abs=1.5 * 0.5 * (high - low))
-
-
 def test_a_search_that_did_not_converge_is_repeated(ranking):
     found = _repeated(replace(ranking.best, converged=False), ck.specimen("uniaxial"), ranking.best.settings, None)
     assert found.converged
     assert found.values["n"] == pytest.approx(4.0, rel=0.02)
-
-
-def test_weights_are_those_of_the_evidence(ranking):
-    odds = np.exp(-0.5 * np.array([r.excess for r in ranking.laws]))
-    assert [r.weight for r in ranking.laws] == pytest.approx(odds / odds.sum(), rel=1e-9)
 
 
 def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
@@ -358,9 +346,8 @@ def test_the_evidence_is_the_probability_of_the_readings_with_the_parameters_int
     rows = jacobian.reshape(-1, 3) * sd
     whole = np.eye(TESTS * ENTRIES) + rates + rows @ rows.T
     assert occam_penalty(linear, factor) + factor.log_determinant == pytest.approx(np.linalg.slogdet(whole)[1])
-    level, nothing = (occam_penalty(linear.of([k]), factor) for k in (0, 2))
-    assert level == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))
-    assert nothing == 0.0
+    assert occam_penalty(linear.of([0]), factor) == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))
+    assert occam_penalty(linear.of([2]), factor) == 0.0
 
 
 def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
