@@ -46,9 +46,8 @@ from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
-from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
+from creepkit.inverse.nuisance_parameters import nuisance_estimates_of, unmodelled_note
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
-from creepkit.inverse.perturbation import unmodelled_note
 from creepkit.inverse.perturbations import (
     LIFE,
     RATE,

@@ -18,8 +18,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import NuisanceParameters, Perturbation
 from creepkit.inverse.perturbations import errors_of_tests, with_derivatives_to_lengths, with_expected_scatter
 from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances

@@ -36,9 +36,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, prior_mean
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.settings import USUAL_ERRORS

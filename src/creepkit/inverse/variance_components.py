@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, lsq_linear, minimize
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
 from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, known_sd
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6

@@ -32,7 +32,7 @@ from creepkit.inverse.evidence import DECISIVE_EXCESS, occam_penalty
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
