@@ -486,7 +486,7 @@ def _predicted(
     leading = []
     for k, history in enumerate(planned):
         outputs = made.predictor.for_history(history).outputs_of_test(history) or prediction.outputs
-        values = prediction.of(k)[:, prediction.outputs.index(outputs[0])]  # the first grows with creep
+        values = prediction.output_of(k, outputs[0])  # the first grows with creep
         leading.append(values[np.isfinite(values)])
     return _Chunk(
         residuals=of_own,

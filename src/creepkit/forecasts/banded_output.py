@@ -165,7 +165,7 @@ NOISES_IN_FLOOR = 3.0
 
 
 COMPARED_STRAIN_RATIO = 1e-2
-"""The same of the scale on which tests are compared (see inverse.observation_vector.log_transform_for)."""
+"""The same of the scale on which tests are compared (see inverse.observation_vector.transform_for)."""
 
 
 @dataclass(frozen=True, eq=False)

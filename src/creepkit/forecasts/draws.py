@@ -17,7 +17,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.nuisance_parameters import owner_of, prior_mean
-from creepkit.inverse.reference_conditions import simulated_condition
+from creepkit.inverse.reference_conditions import condition_at, simulated_stresses
 from creepkit.inverse.single_values import EXTRAPOLATION_FACTOR
 from creepkit.inverse.uncertainty.laplace_approximation import covariance_root
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
@@ -472,7 +472,7 @@ def drawn_law(
 ) -> DrawnLaw:
     """What one law says of one test; weight : of the law. tolerances : {kind: standard deviation}."""
     fit = draws.fit
-    condition = simulated_condition(fit.law, fit.values, history, predictor)
+    condition = condition_at(simulated_stresses(fit.law, fit.values, history, predictor), history)
     dimensions, misfit = uncertain_quantities(fit, history, predictor, tolerances), fit.misfit_at(*condition)
     of_rate = 0.0 if misfit is None else misfit.sd
     if has_sampled_draws(fit):  # samples are those of the tests alone

@@ -226,7 +226,7 @@ def _measured_crossing(history: History, output: str, target: float) -> float:
     """s, when the measured output first reaches a target; NaN where it does not, or is not measured."""
     if output not in history.outputs:
         return float("nan")
-    used = usable_frames(history, output) & (history.times > 0)
+    used = usable_frames(history, output)
     times = history.times[used]
     crossing = first_crossing(times, history.outputs[output][used], target)
     return crossing if times.size and times[0] < crossing < np.inf else float("nan")
@@ -241,7 +241,7 @@ def _inside(banded: History, outputs: Mapping[str, OutputForecast]) -> FramesIns
     for name, forecast in outputs.items():
         if name not in banded.outputs or not usable_frames(banded, name).any():
             continue
-        used, band = usable_frames(banded, name) & (banded.times > 0), forecast.band
+        used, band = usable_frames(banded, name), forecast.band
         values = banded.outputs[name]
         shares[name] = float(((values >= band.low) & (values <= band.high))[used].mean())
         whole[name] = bool(((values >= band.lowest) & (values <= band.highest))[used].all())

@@ -53,14 +53,10 @@ class Bounds:
             sampled = lower + qmc.Sobol(lower.size, seed=0).random(EXPONENT_SAMPLES) * (upper - lower)
             exponents = coordinates.u(sampled)[:, local_exponent.position]
             exponents = exponents[np.isfinite(exponents)]
-            lower[local_exponent.position], upper[local_exponent.position] = (
-                float(exponents.min()),
-                float(max(min(exponents.max(), LARGEST_EXPONENT), exponents.min() + 1.0)),
-            )
-        for k in coordinates.term_rates:
-            lower[k], upper[k] = log_rate + LOG_RATE_BOUNDS[0], log_rate + LOG_RATE_BOUNDS[1]
-        for k in coordinates.state_rates:
-            lower[k], upper[k] = log_internal_rate + LOG_RATE_BOUNDS[0], log_internal_rate + LOG_RATE_BOUNDS[1]
+            lower[local_exponent.position] = exponents.min()
+            upper[local_exponent.position] = max(min(exponents.max(), LARGEST_EXPONENT), exponents.min() + 1.0)
+        for positions, middle in ((coordinates.term_rates, log_rate), (coordinates.state_rates, log_internal_rate)):
+            lower[list(positions)], upper[list(positions)] = (middle + end for end in LOG_RATE_BOUNDS)
         return cls(lower, upper)
 
     def with_nuisances(self, nuisances: NuisanceParameters) -> Bounds:

@@ -63,9 +63,8 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
     if not tests:
         raise FitError("none of the tests has a curve or a minimum creep rate, from which a law could be identified")
     curves, several = [h for h in tests if h.outputs], _several_stresses(tests)
-    steady = ["norton", *(["hyperbolic-sine"] if several else [])]
-    if several:
-        steady += laws_of_changing_exponent(tests)
+    strained = [h for h in curves if is_logarithmic(growing_output(h))]
+    steady = ["norton", *(["hyperbolic-sine", *laws_of_changing_exponent(tests)] if several else [])]
     if 2 * len(curves) < len(tests):
         ruptures = sum(h.rupture_time is not None for h in tests if not h.outputs) >= FEWEST_RUPTURES
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
@@ -73,8 +72,8 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
         names = [*steady[:1], *steady[2:], "mpc-omega", "kachanov-rabotnov", *(["sinh-damage"] if several else [])]
     elif _share(curves, _relaxes) > SHARE:
         names = [*steady, *(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
-    elif _share(_strained(curves), shows_primary_creep) > SHARE:
-        exhaustion = ["logarithmic"] * (_share(_strained(curves), falls_logarithmically) > SHARE)
+    elif _share(strained, shows_primary_creep) > SHARE:
+        exhaustion = ["logarithmic"] * (_share(strained, falls_logarithmically) > SHARE)
         names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening", *exhaustion]
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
@@ -171,10 +170,6 @@ def _stresses(history: History) -> list[float]:
 def _relaxes(history: History) -> bool:
     """Whether strain is held: such a curve does not show whether its first fall is primary creep."""
     return history.loading.quantity == "strain"
-
-
-def _strained(curves: Sequence[History]) -> list[History]:
-    return [h for h in curves if is_logarithmic(growing_output(h))]
 
 
 def _share(tests: Sequence[History], shows: Callable[[History], bool]) -> float:

@@ -62,7 +62,13 @@ def local_exponents(law: CreepLaw) -> tuple[LocalExponent, ...]:
     """Those of a law's terms that are worth a coordinate; none for terms that mention internal variables."""
     key = (law.fingerprint, law.names, tuple(param.bounds for param in law.params.values()))
     if key not in _CACHE:
-        _CACHE[key] = _derived(law)
+        used_positions, exponents = set[int](), list[LocalExponent]()
+        for term in law.terms.values():
+            exponent = _exponent_of_term(law, term, used_positions)
+            if exponent is not None:
+                exponents.append(exponent)
+                used_positions |= {exponent.position, *exponent.others}
+        _CACHE[key] = tuple(exponents)
     return _CACHE[key]
 
 
@@ -72,17 +78,6 @@ _CACHE: dict[tuple[str, tuple[str, ...], tuple[tuple[float, float], ...]], tuple
 
 SIMPLIFICATION_LIMIT = 750
 """Size of a term up to which sympy simplifies its exponent in seconds; others have none found."""
-
-
-def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
-    used_positions: set[int] = set()
-    exponents = []
-    for label in law.terms:
-        exponent = _exponent_of_term(law, law.terms[label], used_positions)
-        if exponent is not None:
-            exponents.append(exponent)
-            used_positions |= {exponent.position, *exponent.others}
-    return tuple(exponents)
 
 
 def _exponent_of_term(law: CreepLaw, term: sympy.Expr, used_positions: set[int]) -> LocalExponent | None:
@@ -228,7 +223,7 @@ class Coordinates:
 
     def _jacobian(self, u: Floats) -> Floats:
         theta = self.theta(u)
-        matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
+        matrix = np.tile(np.eye(theta.shape[-1]), (*theta.shape[:-1], 1, 1))
         for k, positions, kernel in self._rate_kernels:
             internal = np.moveaxis(theta[..., positions], -1, 0)
             derivatives = kernel.internal_derivatives(*self._point(kernel.law), *internal)
@@ -239,7 +234,7 @@ class Coordinates:
 
     def _exponents_jacobian(self, theta: Floats) -> Floats:
         """Derivatives of the parameters that local exponents stand for, (..., parameters, parameters)."""
-        matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
+        matrix = np.tile(np.eye(theta.shape[-1]), (*theta.shape[:-1], 1, 1))
         for local in self.exponents:
             _, b, da, db = local.evaluate(self._point(self.law_there), theta)
             matrix[..., local.position, local.position] = 1.0 / b
@@ -300,10 +295,8 @@ def _coefficient_position(law: CreepLaw, single_term: CreepLaw) -> int | None:
     from creepkit.kernels.log_form import log_form
 
     (coefficients,) = log_form(single_term).coefficients
-    names = [single_term.names[k] for k in coefficients]
     expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    occurrences = [
-        sum(symbol in each.free_symbols for each in expressions) for symbol in (law.symbol(n) for n in names)
-    ]
-    unshared = [n for n, count in zip(names, occurrences, strict=True) if count == 1]
-    return law.names.index(unshared[0]) if unshared else None
+    for name in (single_term.names[k] for k in coefficients):
+        if sum(law.symbol(name) in each.free_symbols for each in expressions) == 1:
+            return law.names.index(name)
+    return None

@@ -10,7 +10,7 @@ from typing import Literal
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
+from creepkit.inverse.goodness_of_fit import OutputErrors, compared_readings, output_errors, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.reference_conditions import usable_frames
@@ -46,7 +46,7 @@ class Fold:
         history, prediction = self.held_out[k], self.prediction
         assert self.fit.predictor is not None
         return {
-            name: errors_of_output(history, name, prediction.of(k)[:, prediction.outputs.index(name)])
+            name: output_errors(*compared_readings(history, name, prediction.output_of(k, name)))
             for name in compared_outputs(self.fit.predictor, history)
             if usable_frames(history, name).any()
         }
@@ -85,15 +85,13 @@ class CrossValidation(Presentable):
 
     def pooled_error(self, output: str) -> float:
         """Relative squared error of one output over all held-out tests, about the mean of all their frames."""
-        measured, predicted = [], []
-        for fold in self.folds:
-            column = fold.prediction.outputs.index(output)
-            for k, history in enumerate(fold.held_out):
-                if output in history.outputs:
-                    used = usable_frames(history, output)
-                    measured.append(history.outputs[output][used])
-                    predicted.append(fold.prediction.of(k)[used, column])
-        return relative_squared_error(measured, predicted)
+        readings = [
+            compared_readings(history, output, fold.prediction.output_of(k, output))
+            for fold in self.folds
+            for k, history in enumerate(fold.held_out)
+            if output in history.outputs
+        ]
+        return relative_squared_error([one[0] for one in readings], [one[1] for one in readings])
 
     shown_by = "inference.cross_validation_text"
 

@@ -174,11 +174,12 @@ def test_fits(
         )
         linear = int((observations.present[k] & ~logarithmic[k]).sum())
         offset_by_output = {name: float(v) for name, v in zip(observations.outputs, offsets[k], strict=True)}
-        outputs = tuple(
-            _output_fit(history, name, prediction.of(k)[:, prediction.outputs.index(name)], offset_by_output[name])
-            for name in compared_outputs(problem.predictor, history)
-            if name in offset_by_output and usable_frames(history, name).any()
-        )
+        outputs = []
+        for name in compared_outputs(problem.predictor, history):
+            if name in offset_by_output and usable_frames(history, name).any():
+                offset = offset_by_output[name]
+                readings = compared_readings(history, name, prediction.output_of(k, name) + offset)
+                outputs.append(OutputFit(name, output_errors(*readings), offset, float(np.median(readings[2]))))
         test_fits.append(
             TestFit(
                 history.name,
@@ -187,22 +188,20 @@ def test_fits(
                 rms,
                 bias,
                 float(np.exp(log_factors[k])),
-                outputs,
+                tuple(outputs),
                 *single_values[k],
             )
         )
     return tuple(test_fits)
 
 
-def errors_of_output(history: History, name: str, predicted: Floats) -> OutputErrors:
-    """Errors of one output of one test over its usable frames; predicted : (frames,) in the output's unit."""
+def compared_readings(history: History, name: str, predicted: Floats) -> tuple[Floats, Floats, Floats]:
+    """Measured and predicted values of one output of one test and the noise of the former, (usable frames,) each.
+
+    predicted : (frames,) in the output's unit.
+    """
     used = usable_frames(history, name)
-    return output_errors(history.outputs[name][used], predicted[used], noise_standard_deviation(history, name)[used])
-
-
-def _output_fit(history: History, name: str, predicted: Floats, offset: float) -> OutputFit:
-    noise = noise_standard_deviation(history, name)[usable_frames(history, name)]
-    return OutputFit(name, errors_of_output(history, name, predicted + offset), offset, float(np.median(noise)))
+    return history.outputs[name][used], predicted[used], noise_standard_deviation(history, name)[used]
 
 
 def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floats) -> Floats:
@@ -243,15 +242,12 @@ def pooled_errors(
     histories: Sequence[History], prediction: Prediction, tests: Sequence[TestFit]
 ) -> Mapping[str, OutputErrors]:
     """{output: errors over all used frames of all tests}, offsets included."""
-    names = dict.fromkeys(output_fit.output for m in tests for output_fit in m.outputs)
-    errors_by_output = {}
-    for name in names:
-        measured, predicted, noise = [], [], []
-        for k, (history, test) in enumerate(zip(histories, tests, strict=True)):
-            for one in (o for o in test.outputs if o.output == name):
-                used = usable_frames(history, name)
-                measured.append(history.outputs[name][used])
-                predicted.append(prediction.of(k)[used, prediction.outputs.index(name)] + one.offset)
-                noise.append(noise_standard_deviation(history, name)[used])
-        errors_by_output[name] = output_errors(*(np.concatenate(v) for v in (measured, predicted, noise)))
-    return errors_by_output
+    readings: dict[str, list[tuple[Floats, ...]]] = {}
+    for k, (history, test) in enumerate(zip(histories, tests, strict=True)):
+        for one in test.outputs:
+            predicted = prediction.output_of(k, one.output) + one.offset
+            readings.setdefault(one.output, []).append(compared_readings(history, one.output, predicted))
+    return {
+        name: output_errors(*(np.concatenate(parts) for parts in zip(*of_tests, strict=True)))
+        for name, of_tests in readings.items()
+    }

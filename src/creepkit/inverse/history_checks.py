@@ -212,9 +212,9 @@ def _check_without_frames(history: History, predictor: Predictor) -> None:
             f"history '{history.name}' has no frames, no minimum rate and no known end: nothing to identify a law from"
         )
     if history.minimum_rate is None and not predictor.for_history(history).follows_to_rupture:
-        name = getattr(predictor.for_history(history), "name", "predictor")
         raise FitError(
-            f"history '{history.name}' has its end alone, and {name} follows no test to rupture; leave the test out"
+            f"history '{history.name}' has its end alone, and {predictor.for_history(history).label} follows no test "
+            "to rupture; leave the test out"
         )
 
 
@@ -225,7 +225,7 @@ def check_explicit_nuisances(
     if not kinds or not observations.followed_to_rupture.any():
         return
     history = histories[int(np.argmax(observations.followed_to_rupture))]
-    name = getattr(predictor.for_history(history), "name", "predictor")
+    name = predictor.for_history(history).label
     raise FitError(
         f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
         f"{name}); leave it out, or drop how they ended: history.replace(rupture_time=None, unruptured=False)"

@@ -29,6 +29,7 @@ from creepkit.inverse.reference_conditions import (
     reference_end_strain,
     reference_stresses,
     simulated_stresses,
+    spans_temperatures,
     usable_frames,
 )
 from creepkit.inverse.uncertainty.rate_scatter import unstated_member_notes
@@ -126,12 +127,12 @@ def identification_notes(estimation: EstimationResult, nuisances: Sequence[Nuisa
     sentences, law, histories, settings = [], problem.law, problem.histories, problem.settings
     if not estimation.converged:
         sentences.append("the last refinement stopped at its largest number of steps: raise starts or look at the plot")
-    temperatures = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
-    if max(temperatures) - min(temperatures) > 5 and not law.uses(temperature):
+    temperatures = [float(v) for h in histories for v in h.followed_temperatures]
+    if spans_temperatures(histories) and not law.uses(temperature):
         sentences.append(
             f"the tests span {celsius_text(min(temperatures), max(temperatures))} and this law knows no temperature"
         )
-    elif max(temperatures) - min(temperatures) > 5:
+    elif spans_temperatures(histories):
         isothermal = [str(s) for s, state in law.states.items() if state.rate != 0 and not state.rate.has(temperature)]
         if isothermal:
             sentences.append(f"the rate of {', '.join(isothermal)} knows no temperature, as that of creep does")

@@ -42,28 +42,23 @@ FLOOR_SHARE, FLOOR_NOISES = 0.01, 3.0
 
 
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
-    """The transform of one output of these histories, all of which have it."""
+    """The transform of one output of these histories, all of which have it.
+
+    Of strains logarithmic, with a floor at 1 % of the median end value and never below three times the noise of a
+    frame; of other curves linear, in standard deviations of all their frames about their one mean.
+    """
     if output == RUPTURE_OUTPUT:
         return SingleValueTransform(-1.0)
     if output == MINIMUM_RATE_OUTPUT:  # a test that breaks at once has e times the largest rate that was measured
         return SingleValueTransform(1.0, float(np.log(max(h.minimum_rate or 0.0 for h in histories))) + 1.0)
-    return log_transform_for(histories, output) if is_logarithmic(output) else linear_transform_for(histories, output)
-
-
-def log_transform_for(histories: Sequence[History], output: str) -> LogTransform:
-    """A floor at 1 % of the median end value, and never below three times the frame-to-frame noise."""
-    largest_values = [float(np.max(h.outputs[output][usable_frames(h, output)], initial=0.0)) for h in histories]
-    noise = np.median([frame_noise(h, output) for h in histories])
-    median_largest = float(np.median(largest_values))
-    return LogTransform(max(FLOOR_SHARE * median_largest, FLOOR_NOISES * float(noise), 1e-14))
-
-
-def linear_transform_for(histories: Sequence[History], output: str) -> LinearTransform:
-    """The standard deviation of all frames of all tests about their one mean."""
-    values = np.concatenate([h.outputs[output][usable_frames(h, output)] for h in histories])
-    scale = float(np.std(values)) if values.size else 0.0
-    largest = float(np.max(values, initial=0.0))
-    return LinearTransform(max(scale, 1e-6 * abs(largest), 1e-14), largest)
+    values = [h.outputs[output][usable_frames(h, output)] for h in histories]
+    if is_logarithmic(output):
+        typical = float(np.median([np.max(one, initial=0.0) for one in values]))
+        noise = float(np.median([frame_noise(h, output) for h in histories]))
+        return LogTransform(max(FLOOR_SHARE * typical, FLOOR_NOISES * noise, 1e-14))
+    joined = np.concatenate(values)
+    largest, spread = float(np.max(joined, initial=0.0)), float(np.std(joined)) if joined.size else 0.0
+    return LinearTransform(max(spread, 1e-6 * abs(largest), 1e-14), largest)
 
 
 def selected_frames(history: History, count: int) -> Ints:

@@ -32,10 +32,11 @@ from creepkit.inverse.observation_vector import ObservationVector, thinned_histo
 from creepkit.inverse.prediction_failures import PredictionFailures
 from creepkit.inverse.reference_conditions import (
     ReferencePoint,
+    condition_at,
     median_log_inverse_duration,
     median_log_strain_rate,
     reference_condition,
-    simulated_condition,
+    simulated_stresses,
 )
 from creepkit.inverse.residuals import candidate_residuals, residuals_at_measured_values, residuals_of_prediction
 from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances, bounded_least_squares
@@ -182,7 +183,8 @@ class LeastSquaresProblem:
     def with_simulated_stresses(self, x: Floats) -> LeastSquaresProblem:
         """The same with the stresses that tests go through at unknowns x (unknowns,)."""
         values = self.coordinates.values(x[: self.parameter_count])
-        conditions = [simulated_condition(self.law, values, h, self.predictor) for h in self.histories]
+        stresses = [simulated_stresses(self.law, values, h, self.predictor) for h in self.histories]
+        conditions = [*map(condition_at, stresses, self.histories)]
         return replace(self, conditions=np.array(conditions).T)
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:

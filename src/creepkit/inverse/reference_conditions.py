@@ -131,32 +131,21 @@ def simulated_stresses(
     A plate that bulges sees a third of the stress that it begins with: the reference stresses alone do not say which
     stresses tests told of.
     """
-    own = None if predictor is None else predictor.for_history(history)
+    own, stresses = None if predictor is None else predictor.for_history(history), None
     with suppress(CreepkitError):  # a law that ends a test before its first frame says nothing of it
         stresses = None if own is None else own.simulated_stress(law, values, history)
-        if stresses is not None:
-            return _positive(np.atleast_1d(np.asarray(stresses, float)))
-    return _positive(reference_stresses(history, predictor))
-
-
-def _positive(stresses: Floats) -> Floats:
+    stresses = reference_stresses(history, predictor) if stresses is None else np.atleast_1d(stresses)
     return stresses[stresses > 0]
 
 
 def reference_condition(history: History, predictor: Predictor | None = None) -> tuple[float, float]:
-    """Median of the reference stresses of a test above zero, MPa, 1e-6 where none is; and its mean temperature, K."""
-    return _median(_positive(reference_stresses(history, predictor))), history.mean_temperature
+    """The condition by the reference stresses of a test."""
+    return condition_at(reference_stresses(history, predictor), history)
 
 
-def simulated_condition(
-    law: CreepLaw, values: Mapping[str, float], history: History, predictor: Predictor | None
-) -> tuple[float, float]:
-    """The same of the stresses that a test goes through by a law with values."""
-    return _median(simulated_stresses(law, values, history, predictor)), history.mean_temperature
-
-
-def _median(stresses: Floats) -> float:
-    return float(np.median(stresses)) if stresses.size else 1e-6
+def condition_at(stresses: Floats, history: History) -> tuple[float, float]:
+    """Median of the stresses (stresses,) of a test above zero, MPa, 1e-6 where none is; and its mean temperature, K."""
+    return float(np.median(stresses[stresses > 0])) if (stresses > 0).any() else 1e-6, history.mean_temperature
 
 
 def _stated(history: History, predictor: Predictor | None, method: str) -> Any:

@@ -99,6 +99,10 @@ class Prediction:
         """Outputs of one test, (times, outputs)."""
         return np.asarray(self.values[candidate, test, : int(self.lengths[test])])
 
+    def output_of(self, test: int, output: str) -> Floats:
+        """One output of one test, (times,), of the first candidate."""
+        return self.of(test)[:, self.outputs.index(output)]
+
 
 NuisanceKind: TypeAlias = str
 """What a nuisance parameter is of: one of GENERAL_NUISANCES, or a length of a test piece."""

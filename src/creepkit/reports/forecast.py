@@ -310,7 +310,7 @@ def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, F
     history = test.history
     if output not in history.outputs:
         return np.zeros(0), np.zeros(0)
-    used = usable_frames(history, output) & (history.times > 0)
+    used = usable_frames(history, output)
     return history.times[used] / SECONDS_PER_HOUR, factor * history.outputs[output][used]
 
 

@@ -84,31 +84,17 @@ class ModelAverage(RateStatements, Presentable):
 
     def interval_at(self, quantity: PointQuantity, point: Mapping[str, ArrayLike | None]) -> Interval:
         """Median and 95 % interval over the laws; point : {name: (...,) or None for the best law's reference}."""
-        return self.distribution(quantity, **point).interval()
-
-    def distribution(
-        self,
-        quantity: PointQuantity,
-        stress: ArrayLike | None,
-        temperature: ArrayLike | None,
-        strain: ArrayLike | None,
-        time: ArrayLike | None,
-    ) -> MixtureDistribution:
-        """The distribution over the laws of quantity(coordinates, stress, temperature, strain, time).
-
-        stress, temperature, strain, time : numbers or arrays that broadcast, as in `rate`.
-        """
         reference = self.fits[0].reference
-        T = reference.temperature if temperature is None else temperature
-        strain, time = (reference.strain if strain is None else strain), (reference.time if time is None else time)
-        functions = [quantity(fit.coordinates, stress, T, strain, time) for fit in self.fits]
+        point = {name: getattr(reference, name) if value is None else value for name, value in point.items()}
+        functions = [quantity(fit.coordinates, **point) for fit in self.fits]
         normals = [_normal_under_law(fit, function) for fit, function in zip(self.fits, functions, strict=True)]
         location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
         if quantity is log_rate:
-            at = np.asarray(stress, float), np.asarray(T, float)
+            at = np.asarray(point["stress"], float), np.asarray(point["temperature"], float)
             misses = [f.misfit_half_widths(g, *at) / NORMAL_QUANTILE for f, g in zip(self.fits, functions, strict=True)]
             scale = np.stack([np.hypot(own, more) for own, more in zip(scale, misses, strict=True)])
-        return MixtureDistribution(np.array(self.weights), np.full(len(self.fits), NORMAL_FREEDOM), location, scale)
+        freedom = np.full(len(self.fits), NORMAL_FREEDOM)
+        return MixtureDistribution(np.array(self.weights), freedom, location, scale).interval()
 
     shown_by = "inference.model_average_text"
 

@@ -98,8 +98,7 @@ class QuadraticResiduals:
 
     @property
     def _pairs(self) -> tuple[Ints, Ints]:
-        first, second = np.triu_indices(self.centre.size)
-        return np.asarray(first, np.int64), np.asarray(second, np.int64)
+        return np.triu_indices(self.centre.size)
 
     def _standardised(self, u: Floats) -> Floats:
         return np.asarray(np.linalg.solve(self.root, (u - self.centre).T).T)
@@ -245,9 +244,8 @@ class Posterior:
     @property
     def _rates_are_coefficients(self) -> bool:
         """Whether the effect of a test's own rate is taken where a candidate is."""
-        problem, law = self.problem, self.problem.law
-        is_separable = len(problem.coordinates.coefficients) == len(law.terms) + len(law.states)
-        return is_separable and not problem.observations.followed_to_rupture.any() and self.rate_sd > 0
+        followed = self.problem.observations.followed_to_rupture.any()
+        return self.problem.coordinates.every_rate_has_coefficient and not followed and self.rate_sd > 0
 
     def inside(self, u: Floats) -> Bools:
         """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold.

@@ -14,7 +14,7 @@ import numpy as np
 from creepkit import limits
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
-from creepkit.errors import FitError, quoted
+from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.language import CreepLaw
@@ -98,8 +98,8 @@ class RateStatements:
         return self._interval(local_exponent, warn, stress, temperature, strain, time)
 
     def _interval(self, quantity: PointQuantity, warn: bool, *point: ArrayLike | None) -> Interval:
-        named = dict(zip(("stress", "temperature", "strain", "time"), point, strict=True))
-        check_state(**named)
+        named = dict(zip(STATE_LIMITS, point, strict=True))
+        check_state(named)
         if warn:
             warn_of_extrapolation(self.stated_laws, self.ranges, named, stacklevel=5)
         return self.interval_at(quantity, named)
@@ -137,9 +137,7 @@ def rate_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The creep rate, 1/s, at a stress (MPa) and temperature (K); what is left out is that of the reference point."""
-    point = _checked_point(stress, temperature, strain, time)
-    name = f"rate {_point_text(stress, temperature)}"
-    return DerivedQuantity(name, "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time), point)
+    return _at(("rate", "1/s", "log"), log_rate, stress, temperature, strain, time)
 
 
 @checked
@@ -147,9 +145,17 @@ def exponent_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
 ) -> DerivedQuantity:
     """The local stress exponent d ln rate / d ln stress there."""
-    point = _checked_point(stress, temperature, strain, time)
-    name = f"local exponent {_point_text(stress, temperature)}"
-    return DerivedQuantity(name, "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time), point)
+    return _at(("local exponent", "1", "linear"), local_exponent, stress, temperature, strain, time)
+
+
+def _at(
+    named: tuple[str, str, Literal["linear", "log"]], quantity: PointQuantity, *given: float | None
+) -> DerivedQuantity:
+    """A quantity at a point; named : its name, unit and scale."""
+    (name, unit, scale), point = named, dict(zip(STATE_LIMITS, given, strict=True))
+    check_state(point)
+    where = f"{point['stress']:g} MPa" + ("" if point["temperature"] is None else f", {point['temperature']:g} K")
+    return DerivedQuantity(f"{name} at {where}", unit, scale, lambda c: quantity(c, **point), point)
 
 
 STATE_LIMITS = {
@@ -161,31 +167,11 @@ STATE_LIMITS = {
 """Of a state at which a quantity can be asked for, in MPa, K, - and s."""
 
 
-def check_state(stress: Any, temperature: Any = None, strain: Any = None, time: Any = None) -> None:
-    """FitError for what is no state of a material; numbers or arrays in MPa, K, - and s, or None."""
-    for name, value in {"stress": stress, "temperature": temperature, "strain": strain, "time": time}.items():
+def check_state(point: Mapping[str, Any]) -> None:
+    """FitError for what is no state of a material; point : {name: number or (...,)} in MPa, K, - and s, or None."""
+    for name, value in point.items():
         if value is not None or name == "stress":
             limits.check_numbers(f"{name} of a creep rate", value, STATE_LIMITS[name], FitError)
-
-
-def _checked_point(stress: Any, temperature: Any, strain: Any, time: Any) -> dict[str, float | None]:
-    """The point by name; FitError for one that is no state of a material."""
-    given = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
-    for name, value in given.items():
-        if value is None and name != "stress":
-            continue
-        is_number = isinstance(value, int | float | np.number) and bool(np.isfinite(value))
-        if not is_number or value not in STATE_LIMITS[name]:
-            raise FitError(
-                f"a quantity was asked for at {name} {quoted(repr(value))}; give a number: a stress in MPa above "
-                "zero, a "
-                "temperature in K above zero, a strain, a time in s"
-            )
-    return {name: None if value is None else float(value) for name, value in given.items()}
-
-
-def _point_text(stress: float, temperature: float | None) -> str:
-    return f"at {stress:g} MPa" + ("" if temperature is None else f", {temperature:g} K")
 
 
 def log_rate(
@@ -204,13 +190,9 @@ def log_rate(
 
     law, reference = coordinates.law_there, coordinates.reference
     kernel = lower(law, "numpy")
-    check_state(stress, temperature, strain, time)
-    given = (
-        (stress, reference.stress),
-        (strain, reference.strain),
-        (time, reference.time),
-        (temperature, reference.temperature),
-    )
+    stated = {"stress": stress, "strain": strain, "time": time, "temperature": temperature}
+    check_state(stated)
+    given = ((value, getattr(reference, name)) for name, value in stated.items())
     point = np.broadcast_arrays(*(np.asarray(default if v is None else v, float) for v, default in given))
     initial_states = [z.initial for z in law.states.values()]
     shape = point[0].shape
@@ -225,34 +207,21 @@ def log_rate(
 
 
 def local_exponent(
-    coordinates: Coordinates,
-    stress: ArrayLike,
-    temperature: ArrayLike | None = None,
-    strain: ArrayLike | None = None,
-    time: ArrayLike | None = None,
+    coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, **state: ArrayLike | None
 ) -> CoordinateFunction:
     """The local stress exponent at points; stress, temperature, strain, time : as in `log_rate`, they broadcast."""
     level = np.asarray(stress, float)
     above, below = (
-        log_rate(coordinates, level * f, temperature, strain, time)
+        log_rate(coordinates, level * f, temperature, **state)
         for f in (EXPONENT_STRESS_RATIO, 1 / EXPONENT_STRESS_RATIO)
     )
     return lambda u: (above(u) - below(u)) / (2 * np.log(EXPONENT_STRESS_RATIO))
 
 
-def activation_energy(
-    coordinates: Coordinates,
-    stress: ArrayLike,
-    temperature: float,
-    strain: ArrayLike | None = None,
-    time: ArrayLike | None = None,
-) -> CoordinateFunction:
-    """The activation energy -R d ln rate / d(1/T), J/mol, at points.
-
-    stress, strain, time : as in `log_rate`, they broadcast to (points,); temperature : one, K.
-    """
+def activation_energy(coordinates: Coordinates, stress: ArrayLike, temperature: float) -> CoordinateFunction:
+    """The activation energy -R d ln rate / d(1/T), J/mol, at stresses (points,), MPa, and one temperature, K."""
     ends = (temperature / ENERGY_TEMPERATURE_RATIO, temperature * ENERGY_TEMPERATURE_RATIO)
-    colder, hotter = (log_rate(coordinates, stress, end, strain, time) for end in ends)
+    colder, hotter = (log_rate(coordinates, stress, end) for end in ends)
     return lambda u: GAS_CONSTANT * (hotter(u) - colder(u)) / (1 / ends[0] - 1 / ends[1])
 
 
