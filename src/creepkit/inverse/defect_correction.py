@@ -73,13 +73,7 @@ def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquare
     refined = problem.predictor.refined()
     if refined is None or problem.observations.followed_to_rupture.any():
         return problem, None
-    observations, count = problem.observations, problem.parameter_count
-    prediction = refined.predict(
-        problem.law,
-        problem.coordinates.theta(x[:count])[None],
-        problem.histories,
-        nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
-    )
+    observations, prediction = problem.observations, problem.predicted_by(refined, x)
     coarse = _predicted(problem, x)
     exact = observations.select_outputs(prediction.values, prediction)[0]
     complete = np.isin(prediction.status[0], (Status.COMPLETE, Status.OUTSIDE_DOMAIN))

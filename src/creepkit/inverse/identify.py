@@ -238,10 +238,9 @@ def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
 
 def _check_bounds(found: EstimationResult) -> None:
     """FitError where the bounds of the law exclude the data."""
-    residuals, jacobian = found.linear.residuals, found.linear.residuals.jacobian
-    assert jacobian is not None
-    factor, count = CovarianceFactor.of_residuals(residuals, found.noise), found.problem.parameter_count
-    gradient = np.einsum("te,tep->p", factor.inverse_times(residuals.values), jacobian)
+    residuals, count = found.linear.residuals, found.problem.parameter_count
+    weighted = CovarianceFactor.of_residuals(residuals, found.noise).inverse_times(residuals.values)
+    gradient = np.einsum("te,tep->p", weighted, residuals.jacobian)
     check_bounds(found.problem.bound_penalties, found.x[:count], gradient[:count], found.problem.observations.count)
 
 
@@ -387,12 +386,7 @@ def _reported(
     rates = RateExplanations(problem, x, judged, noise_model)
     covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
-    prediction = problem.predictor.predict(
-        law,
-        coordinates.theta(u)[None],
-        list(histories),
-        nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
-    )
+    prediction = problem.predicted_by(problem.predictor, x, histories)
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)

@@ -185,7 +185,6 @@ def _stepped(
     target[free] += solution.step
     x = problem.constrained(linear.x, target, free, solution.covariance)
     size = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
-    assert residuals.jacobian is not None
     for _ in range(MOST_HALVINGS if size > least else 0):
         expected = replace(residuals, values=residuals.values + residuals.jacobian @ (x - linear.x))
         moved = _about_predicted_rates(problem, x, expected, noise)
@@ -208,8 +207,7 @@ def within_bounds(found: EstimationResult) -> EstimationResult:
 
 def is_finite(residuals: Residuals) -> bool:
     """Whether residuals and their derivatives are numbers."""
-    jacobian = residuals.jacobian
-    return jacobian is not None and bool(np.isfinite(residuals.values).all() and np.isfinite(jacobian).all())
+    return bool(np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all())
 
 
 def judged_at(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> LinearisedProblem:
@@ -257,7 +255,6 @@ def _with_priors_found(
     nuisances = problem.nuisance_parameters
     if all(n.sd is not None for n in nuisances.nuisances):
         return problem
-    assert residuals.jacobian is not None
     whitened = CovarianceFactor.of_residuals(residuals, noise).whiten(residuals.jacobian)
     return problem.with_nuisances(_with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), x))
 

@@ -49,7 +49,7 @@ class Residuals:
     offset_sensitivity : (tests, observations) 1 / unit, effect of one unit of offset.
     present : (tests, observations) which are data; the others are zero.
     correlation_coordinate : (tests, observations) -, in which drifts decay: ln t or a share of the duration.
-    jacobian : (tests, observations, unknowns) derivatives to x = (u, e), or None.
+    jacobian : (tests, observations, unknowns) derivatives to x = (u, e).
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
         the typical noise of that output.
@@ -67,7 +67,7 @@ class Residuals:
     offset_sensitivity: Floats
     present: Bools
     correlation_coordinate: Floats
-    jacobian: Floats | None
+    jacobian: Floats
     log_rate_sensitivity: Floats
     output_index: Ints
     relative_noise: Floats

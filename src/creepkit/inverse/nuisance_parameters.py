@@ -175,7 +175,7 @@ class NuisanceParameters:
         residuals there do not show that scatter. Nuisance parameters that tests share stay as estimated.
         """
         test_parameters = self.integrated
-        if not test_parameters or residuals.jacobian is None:
+        if not test_parameters:
             return residuals
         sensitivities = residuals.jacobian[..., -self.size :][..., test_parameters]
         values = residuals.values - sensitivities @ (e - self.mean)[test_parameters]

@@ -68,11 +68,9 @@ def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_sl
 
 def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
     """Residuals of zero with the derivatives at the measured values: a covariance exists before any prediction."""
-    observed = observations.values
-    derivatives = np.where(observations.present, observations.derivative(observed), 0.0)
-    return _masked_residuals(
-        observations, np.zeros_like(derivatives), derivatives, None, derivatives * np.maximum(observed, 0.0)
-    )
+    derivatives = np.where(observations.present, observations.derivative(observations.values), 0.0)
+    zero, rates = np.zeros_like(derivatives), derivatives * np.maximum(observations.values, 0.0)
+    return _masked_residuals(observations, zero, derivatives, np.zeros((*zero.shape, 0)), rates)
 
 
 def candidate_residuals(
@@ -293,11 +291,7 @@ def _time_derivative(observations: ObservationVector, predicted: Floats) -> Floa
 
 
 def _masked_residuals(
-    observations: ObservationVector,
-    values: Floats,
-    derivatives: Floats,
-    jacobian: Floats | None,
-    log_rate_sensitivity: Floats,
+    observations: ObservationVector, values: Floats, derivatives: Floats, jacobian: Floats, log_rate_sensitivity: Floats
 ) -> Residuals:
     residuals = Residuals(
         values=values,

@@ -37,13 +37,11 @@ class LinearisedProblem:
     @property
     def jacobian(self) -> Floats:
         """(tests, observations, free unknowns) derivatives of the residuals."""
-        assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
     def of(self, unknowns: Sequence[int]) -> LinearisedProblem:
         """The same of some of the unknowns, the others held."""
         residuals, kept = self.residuals, [*unknowns]
-        assert residuals.jacobian is not None
         return LinearisedProblem(
             replace(residuals, jacobian=residuals.jacobian[..., kept]),
             self.precision[kept],
@@ -92,7 +90,6 @@ class LinearisedProblem:
     def chi_square(self, factor: CovarianceFactor, step: Floats | float = 0.0) -> tuple[float, Floats]:
         """Of residuals and priors after a step (unknowns,), and the whitened residuals (tests, observations)."""
         residuals = self.residuals
-        assert residuals.jacobian is not None
         whitened = factor.whiten(residuals.values + residuals.jacobian @ np.broadcast_to(step, self.precision.shape))
         prior = self.precision * (self.prior_residual + step) ** 2
         return float((whitened**2).sum() + prior.sum()), whitened

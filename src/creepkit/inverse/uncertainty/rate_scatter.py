@@ -331,7 +331,6 @@ def log_prior(sd: Floats, levels: Sequence[str], reach: float = 1.0) -> Floats:
 def redundant_rates(linear: LinearisedProblem, noise_model: NoiseModel) -> int:
     """How many combinations of the rates of tests no unknown moves, within its prior, by more than SMALLEST_FACTOR."""
     residuals = linear.residuals
-    assert residuals.jacobian is not None
     factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
     weighted = factor.inverse_times(residuals.log_rate_sensitivity)
     information = np.maximum((weighted * residuals.log_rate_sensitivity).sum(axis=1), 1e-300)
@@ -358,7 +357,6 @@ def rate_scatter(
     prior_gradient[integrated] = 0.0
     e = nuisances.mean[: nuisances.size] + linear.prior_residual[count:]
     residuals = nuisances.integrate_out(linear.residuals, e)
-    assert residuals.jacobian is not None
     jacobian = residuals.jacobian.copy()
     jacobian[..., integrated] = 0.0
     factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
