@@ -12,7 +12,6 @@ import numpy as np
 from creepkit.arrays import Floats, set_fields
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
-from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identification import Identification
 from creepkit.limits import Limits
 from creepkit.limits import numbers as numbers_between
@@ -27,6 +26,7 @@ from creepkit.records import (
     load_unit,
     loading_of,
 )
+from creepkit.records.held_levels import held_temperatures
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, time_text
 

@@ -21,11 +21,10 @@ from creepkit.forecasts.banded_output import (
     OutputForecast,
 )
 from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
-from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text
+from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text, outside_combinations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.reference_conditions import simulated_stresses, usable_frames
-from creepkit.inverse.tested_region import outside_combinations
 from creepkit.inverse.uncertainty.laplace_approximation import is_open
 from creepkit.inverse.uncertainty.law_misfit import LawMisfit
 from creepkit.inverse.uncertainty.rate_scatter import LEVELS, USUAL_SD

@@ -9,7 +9,7 @@ import numpy as np
 from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs
-from creepkit.inverse.observation_vector import ObservationVector, frames_with_data
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
@@ -198,7 +198,7 @@ def _check_outputs(history: History, predictor: Predictor) -> None:
             f"it has {', '.join(history.outputs) or 'none'}"
         )
     used = history.used & (history.times > 0)
-    if int((used & frames_with_data(history)).sum()) < 2:
+    if int((used & history.frames_with_data).sum()) < 2:
         raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
     for name in outputs:
         if np.isinf(history.outputs[name][used]).any():

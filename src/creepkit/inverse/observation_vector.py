@@ -63,7 +63,7 @@ def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
 
 def selected_frames(history: History, count: int) -> Ints:
     """(selected,) indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
-    candidates = np.flatnonzero(history.used & (history.times > 0) & frames_with_data(history))
+    candidates = np.flatnonzero(history.used & (history.times > 0) & history.frames_with_data)
     if candidates.size <= count:
         return candidates
     times = history.times[candidates]
@@ -72,12 +72,6 @@ def selected_frames(history: History, count: int) -> Ints:
     )
     nearest = np.abs(times[:, None] - targets[None, :]).argmin(axis=0)
     return np.asarray(candidates[np.unique(nearest)])
-
-
-def frames_with_data(history: History) -> Bools:
-    """(frames,) whether any output has a number there."""
-    finite = [np.isfinite(values) for values in history.outputs.values()]
-    return np.asarray(np.any(finite, axis=0)) if finite else np.zeros(history.times.size, bool)
 
 
 def thinned_history(history: History, count: int) -> History:

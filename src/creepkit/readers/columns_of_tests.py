@@ -15,7 +15,7 @@ from functools import lru_cache
 from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number
-from creepkit.readers.ends_of_tests import FIRM, kind_of_column, plain_words
+from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column, plain_words
 from creepkit.readers.table import CellTable, TableRow
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
@@ -107,12 +107,29 @@ _IS_TIME = re.compile(
     r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours)\b|zeit\b"
 )
 RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
-_OF_CREEP = re.compile(r"\b(?:min\w*|steady|second\w*|station\w*|sekund\w*|creep|fluage)\b|kriech")
+_OF_MINIMUM = re.compile(r"\b(?:min\w*|mcr|steady|second\w*|station\w*|sekund\w*|lowest|smallest|kleinste\w*)\b")
+_CREEP_RATE = re.compile(r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*) ?)+")
+_ANOTHER_RATE = re.compile(
+    r"\b(?:average\w*|avg|mean|mittler\w*|durchschnitt\w*|moyenne?|tertia\w*|prima\w*|initial\w*|anfang\w*|final\w*"
+    r"|start|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
+)
+"""Of a rate that is the minimum one, that may be it, and that is another one."""
+
+
 _RATE_SYMBOL = re.compile("[εɛe]\u0307[ _]?(?:min|ss?|m|st|c)?")
 """A dot above the strain, its letters apart from their accents."""
 
 
 _OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine)\b")
+_OF_NO_TEST = re.compile(
+    r"\b(?:specified|specification|required|requirement|expected|predict\w*|calculat\w*|computed|estimat\w*|extrapol\w*"
+    r"|min(?:imum|imal\w*)?|minimale|guaranteed|design|target|theoretical|allow\w*|nominal|planned|soll\w*|mindest\w*"
+    r"|gefordert\w*|vorhergesagt\w*|berechnet\w*|erwartet\w*|geschatzt\w*|geplant\w*|prev[iu]\w*|calculee?s?|estimee?s?"
+    r"|exigee?s?|requise?s?|specifiee?s?|attendue?s?|theorique)\b"
+)
+"""Of what was asked of a test, or is that of a model."""
+
+
 _OF_OTHERS = re.compile(r"elong|dehnung\b|strain\b|allong|parameter|ratio|log|sd\b|std|error|stress\b|date|datum")
 _FACTOR = re.compile(
     r"[x×*·]?\s*(?<![\d./])(?<!/ )(?:10\s*\^?\s*([+\-−]\d+|(?<=\^)\d+|(?<=\^ )\d+|[⁻⁺]?[⁰¹²³⁴-⁹]+)|1[eE]([+-]?\d+))\s*"
@@ -150,6 +167,8 @@ def column_called(written: str) -> TestColumn:
     text = whole if whole in TEXTS else quantity if unit in ("", "pct") else ""
     if quantity not in QUANTITIES and (text or not (quantity := _quantity_by_words(name, unit))):
         return TestColumn(text)
+    if quantity == LABEL:
+        return TestColumn(f"label {written}")
     return TestColumn(quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity] is TIME else ""))
 
 
@@ -163,17 +182,28 @@ def _meaning(name: str, is_per_cent: bool) -> str:
 
 
 def _quantity_by_words(name: str, unit: str) -> str:
-    """The quantity of which the words of a name speak, whatever else they say of it."""
+    """The quantity of which the words of a name speak, whatever else they say of it; LABEL of what no test measured."""
     plain = plain_words(name)
     if _RATE_SYMBOL.fullmatch(unicodedata.normalize("NFD", name)) and unit in RATE.units:
         return "minimum_rate"
     if RATES.fullmatch(plain) and unit in RATE.units:  # in a table of creep tests
         return "minimum_rate"
-    is_rate = RATES.search(plain) and _OF_CREEP.search(plain) and not re.search(r"sd\b|std|err", plain)
-    if is_rate and (unit in RATE.units or unit in ("", "pct")):
+    is_time = unit in TIME.units or (unit == "" and _IS_TIME.search(plain))
+    is_rate = bool(RATES.search(plain)) and not re.search(r"sd\b|std|err", plain) and unit in (*RATE.units, "", "pct")
+    is_min = _OF_MINIMUM.search(plain)
+    is_of_no_test = (is_rate or is_time) and _OF_NO_TEST.search(_OF_MINIMUM.sub("", plain) if is_rate else plain)
+    if is_of_no_test or (is_rate and not is_min and _ANOTHER_RATE.search(plain)):
+        return LABEL
+    if is_rate and (is_min or is_bare_rate(name)):
         return "minimum_rate"
     is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
     return "rupture" if is_rupture else ""
+
+
+def is_bare_rate(name: str) -> bool:
+    """Whether a name is that of a creep rate of which it does not say that it is the smallest."""
+    plain = plain_words(name)
+    return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech", plain) is not None
 
 
 def is_any_rate(written: str) -> bool:
@@ -190,6 +220,8 @@ def _strain_reached(written: str) -> float | None:
     if found is None or re.search(r"rate|geschwindig|vitesse|grenze|limit|stress|spannung|contrainte|offset", plain):
         return None
     if not (plain.strip() == "" or _SYMBOL_TO_STRAIN.fullmatch(text) or _IS_TIME.search(plain)):
+        return None
+    if _OF_NO_TEST.search(plain_words(split_written_name(text)[0])):
         return None
     number = float(found[1].replace(",", "."))
     return number / 100 if 0 < number <= 100 else None
@@ -346,6 +378,7 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
     measured |= any(map(is_any_rate, names)) and "end_time" not in found
+    measured |= any(one.quantity == f"label {name}" for one, name in zip(columns, names, strict=True))
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
     is_framed = "end_time" in found and has_frames(names)
     return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not is_framed)

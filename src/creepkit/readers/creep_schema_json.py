@@ -22,6 +22,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.json_documents import read_json
 from creepkit.files.reading import FileKind, read_bytes
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.ends_of_tests import RUPTURED, STOPPED, UNCLEAR, end_said_by
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of_width
 from creepkit.readers.vocabulary import HeaderVocabulary, plain_name, unit_suffix
 from creepkit.records import History
@@ -63,9 +64,8 @@ ENTRIES: Mapping[str, tuple[str, str]] = {
 MEANINGS: Mapping[str, Mapping[str, str]] = {
     "kind of loading": {"tension": "tension"},
     "control": {"constant force": "load", "constant stress": "stress"},
-    "end": dict.fromkeys(("test piece break", "break", "rupture", "fracture"), "ruptured"),
 }
-"""{what: {text in small letters: what it means}}; any other end is that of a test that was stopped."""
+"""{what: {text in small letters: what it means}}."""
 
 
 CREEP_EXTENSION, PLASTIC_EXTENSION, TOTAL_EXTENSION = EXTENSIONS = (
@@ -161,11 +161,17 @@ def _stated(entries: Mapping[str, SourceText]) -> Iterator[tuple[str, SourceText
         if what in ("kind of loading", "control") and entry.text and not meant:
             allowed = ", ".join(MEANINGS[what])
             raise HistoryError(f"{entry.location}: '{entry.text}' is not understood; allowed: {allowed}")
-        if what == "end" and entry.text and not meant:
-            if entries["rupture"].text:
+        if what == "end" and entry.text:
+            said = end_said_by(
+                entry.text
+            )  # a criterion that says nothing of rupture is that of a test that was stopped
+            if said == UNCLEAR:
+                found = f"'{quoted(entry.text, 60)}' leaves open whether the test piece broke"
+                raise HistoryError(f"{entry.location}: {found}; write 'test piece break', or 'interruption'")
+            if said != RUPTURED and entries["rupture"].text:
                 what = f"it is '{quoted(entry.text, 60)}', and a rupture time is stated"
                 raise HistoryError(f"{entry.location}: {what}; correct one of them")
-            yield "ended", replace(entry, text="stopped")
+            yield "ended", replace(entry, text=RUPTURED if said == RUPTURED else STOPPED)
         elif entry.text and what not in ("kind of loading", "end", "series", "second series"):
             yield what, replace(entry, text=meant or entry.text)
 

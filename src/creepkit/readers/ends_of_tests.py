@@ -213,7 +213,7 @@ _REMARK_WORDS = _words(
 )
 _OTHER_USES = _words(
     r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
-    r"position|lage|mode|type|typ|ort|appearance|allongement",
+    r"position|lage|mode|type|typ|ort|appearance|allongement|rate|(?:kriech)?(?:rate|geschwindigkeit)|vitesse",
 )
 """Words beside one of rupture that make the name of a column that of a quantity or a description."""
 
@@ -293,7 +293,9 @@ def kind_of_column(name: str) -> str:
         return RUPTURED
     if len(words) == 1 and _CODES.get(frozenset(words), {}).get(next(iter(words))) == STOPPED:
         return STOPPED
-    if "/" in name and (said == UNCLEAR or frozenset(re.split(r"\W+", name.casefold())) in _CODES):
+    if "/" in name and (
+        (said == UNCLEAR and not _OTHER_USES.search(plain)) or frozenset(re.split(r"\W+", name.casefold())) in _CODES
+    ):
         return "status"
     if _DESCRIPTION.search(plain):
         return "description"

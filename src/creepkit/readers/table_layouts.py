@@ -538,10 +538,14 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
 def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
     """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
+    begins_with_text = [row.cells[0][:1].isalpha() and row.cells[0].lower() not in _LOST for row in table.rows]
+    is_numbered = any(is_number(row.cells[0], table.dialect) for row in table.rows[1:2])
+    last = next((k for k, is_text in reversed([*enumerate(begins_with_text)]) if not is_text), 0)
+    is_footer = [is_numbered and k > last for k in range(len(table.rows))]  # "Mean | 0.3"
     for k, row in enumerate(table.rows):
-        after = (one for one in table.rows[k + 1 : k + 6] if not _is_remark(one, table))
-        is_frame_row = k < 2 or not _is_remark(row, table)
-        if is_frame_row or any(_begins_again(table.rows[k - 1], one, table) for one in [*after][:1]):
+        after = [one for one in table.rows[k + 1 : k + 6] if not _is_remark(one, table)][:1]
+        is_remark = _is_remark(row, table) and not any(_begins_again(table.rows[k - 1], one, table) for one in after)
+        if k < 2 or not (is_remark or is_footer[k]):
             frames.append(row)
             continue
         text = " ".join(filter(None, row.cells))
@@ -567,6 +571,9 @@ def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
     return known[1] < known[0] if known[1:] else not all(map(is_clock_time, cells))
 
 
+_LOST = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
+
+
 def _is_remark(row: TableRow, table: CellTable) -> bool:
     """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
     cells = [cell for cell in row.cells if cell]
@@ -575,8 +582,7 @@ def _is_remark(row: TableRow, table: CellTable) -> bool:
     if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
         return False
     words = cells[0].lower().strip(".:*-= ").split()
-    lost = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
-    count = sum(word in lost for word in words)
+    count = sum(word in _LOST for word in words)
     return (len(words) > 1 + 3 * count and count < 2) or words in (["end"], ["eof"])
 
 

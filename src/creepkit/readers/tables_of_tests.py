@@ -23,6 +23,7 @@ from creepkit.readers.columns_of_tests import (
     TestColumn,
     TestTableHead,
     column_called,
+    is_bare_rate,
     is_number_like,
     only_text,
     quantity_of,
@@ -174,6 +175,12 @@ class TestTable:
         below = without_ignored(below, 0, self.vocabulary.ignored)
         header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
+        if statistics := [row for row in body if _is_statistic(row, dialect)]:
+            body = [row for row in body if row not in statistics]
+            called = " and ".join(
+                cell for row in statistics for cell in row.cells if _STATISTIC.fullmatch(words_of(cell))
+            )
+            sheet = sheet.assuming(f"rows of {called} are no tests")
         while body and _is_note(body[-1], dialect):
             self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
         named = [k for k, name in enumerate(names) if name]
@@ -249,6 +256,12 @@ class TestTable:
                     column = replace(column, unit=unit)
                 if column.unit not in kind.units:
                     self.errors.append(self._wrong_unit(column, written, cells))
+                elif (
+                    column.quantity == "minimum_rate"
+                    and meant == written
+                    and is_bare_rate(split_written_name(written)[0])
+                ):
+                    self.table = self.table.assuming(f"'{quoted(written, 60)}' is the minimum creep rate")
             elif self._tells_tests_apart(k, column, cells):
                 column = TestColumn("name")
             elif not column.quantity:
@@ -398,6 +411,19 @@ class TestTable:
 _OF_TREATMENT = re.compile(
     r"anneal|ag(?:e?ing|ed)|temper|heat ?treat|soak|solution|glüh|auslager|anlass|recuit|revenu", re.I
 )
+
+
+_STATISTIC = re.compile(
+    r"(?:arithm\w* )?(?:mean|averages?|avg|median|sd|s d|std|st\w* ?dev\w*|cov|scatter|min(?:imum)?|max(?:imum)?|range"
+    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|[ée]cart type)(?: values?| of .*)?"
+)
+"""Of a row below tests that is no test."""
+
+
+def _is_statistic(row: TableRow, dialect: Dialect) -> bool:
+    """Whether the one text in a row of numbers is that of a statistic of the rows above it."""
+    texts = [cell for cell in row.cells if cell and not is_number_like(cell, dialect)]
+    return len(texts) == 1 and _STATISTIC.fullmatch(words_of(texts[0])) is not None
 
 
 def _is_note(row: TableRow, dialect: Dialect) -> bool:

@@ -279,6 +279,12 @@ class History(Measured):
         return self.times[self.used] if self.used.any() else self.times
 
     @property
+    def frames_with_data(self) -> Bools:
+        """(frames,) whether any output has a number there."""
+        finite = [np.isfinite(values) for values in self.outputs.values()]
+        return np.asarray(np.any(finite, axis=0)) if finite else np.zeros(self.times.size, bool)
+
+    @property
     def mean_temperature(self) -> float:
         """Mean temperature over the used frames, K."""
         return float(self.temperature_program().at(self.used_times).mean())

@@ -16,7 +16,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.judging import JudgedResiduals, judged_residuals_of
-from creepkit.inverse.observation_vector import ObservationVector, frames_with_data, selected_frames
+from creepkit.inverse.observation_vector import ObservationVector, selected_frames
 from creepkit.reports.blocks import plural
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class ReadingCounts(NamedTuple):
 def reading_counts(histories: Sequence[History], frames: int) -> ReadingCounts:
     """The readings of tests with outputs; frames : at most so many were selected in each test."""
     tests = [h for h in histories if h.outputs]
-    usable = (h.used & (h.times > 0) & frames_with_data(h) for h in tests)
+    usable = (h.used & (h.times > 0) & h.frames_with_data for h in tests)
     return ReadingCounts(
         sum(h.times.size for h in tests),
         sum(int((~h.used).sum()) for h in tests),

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.held_levels import held_temperatures, is_isothermal, temperature_holds
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_stresses
 from creepkit.records import ZERO_CELSIUS, History, Predictor
+from creepkit.records.held_levels import held_temperatures, is_isothermal, temperature_holds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

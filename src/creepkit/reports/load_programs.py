@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from creepkit.inverse.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.inverse.reference_conditions import HELD_LOAD
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program, load_unit
+from creepkit.records.held_levels import holds, is_isothermal, last_data_time, temperature_holds
 from creepkit.records.loading import held_of
 from creepkit.records.units import time_text
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, NOT_DETERMINED, POORLY_DETERMINED
 from creepkit.records import SECONDS_PER_HOUR
+from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import named
 from creepkit.reports.words import NEXT, TRY

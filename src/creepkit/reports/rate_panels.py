@@ -9,12 +9,12 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
-from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.identified_values import MinimumRate, minimum_rates_of
 from creepkit.inverse.minimum_rates import apparent_energy, apparent_exponent
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
+from creepkit.records.held_levels import held_temperatures
 from creepkit.reports.blocks import ends
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span

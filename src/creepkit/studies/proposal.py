@@ -16,13 +16,13 @@ from typing import Any
 from creepkit.errors import CreepkitError, StudyError
 from creepkit.inverse.candidates import named_candidates
 from creepkit.inverse.compared_tests import duration_known, followed_duration
-from creepkit.inverse.held_levels import held_temperatures
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
 from creepkit.quality.curve_shapes import shows_tertiary_creep
 from creepkit.quality.flags import frame_ranges_text
 from creepkit.readers.questions import ANSWERS_FILE, Question, single_errors
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions_of, load_unit
+from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.registry.reading import read_those_that_can_be
 from creepkit.reports.load_programs import kind_of_test, strain_rate

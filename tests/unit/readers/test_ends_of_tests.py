@@ -335,14 +335,6 @@ def test_a_remark_of_one_row_is_asked_about_though_another_row_is_marked(tmp_pat
     assert [one.unruptured for one in ck.read_histories(tmp_path)] == [False, True, True]
 
 
-def test_a_remark_below_the_frames_says_how_the_test_ended(tmp_path):
-    frames = "# stress_MPa: 120\n# temperature_C: 600\nTime (h);Strain (%)\n0;0\n452;5\n"
-    for text, ruptured, stopped in (("END OF RUN, REMOVED UNBROKEN", None, True), ("Bruch der Probe", 452.0, False)):
-        (tmp_path / "a.csv").write_text(frames + text + "\n")
-        (test,) = ck.read_histories(tmp_path)
-        assert (test.rupture_time and test.rupture_time / 3600.0, test.unruptured) == (ruptured, stopped)
-
-
 def test_a_workbook_with_a_summary_of_merged_cells_a_row_of_units_and_a_note_below(tmp_path):
     book = Workbook()
     sheet = book.active

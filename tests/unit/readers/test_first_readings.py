@@ -319,3 +319,11 @@ def test_lost_readings_pauses_and_extrapolated_points(read):
     assert test.loading.steps == ((0.0, 140.0), (36000.0, 0.0), (72000.0, 140.0))
     (test,) = read(f"{C}{MPA}Time (h);Strain (%);Remark\n0;0;\n9;0.2;\n99;0.9;\n999;4;extrapolated\n")
     assert test.used.tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize("footers", ["Mean;0,3\nMin rate;1e-5", "Bruch nach;105 h", "REMOVED UNBROKEN"])
+def test_rows_below_the_readings_that_begin_with_words_are_remarks(read, footers):
+    (test,) = read(f"Stress (MPa);80\nTemperature (°C);600\nTime (h);Strain (%)\n0;0\n1;0,5\n100;0,75\n{footers}\n")
+    assert (test.times[-1], test.outputs["strain"][-1]) == (360000.0, 0.0075)
+    assert "is a remark" in test.labels["assumed"]
+    assert (test.rupture_time, test.unruptured) == (105 * 3600.0 if "105" in footers else None, "UN" in footers)

@@ -82,14 +82,6 @@ def test_another_laboratory_is_a_declaration(tmp_path):
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
 
 
-def test_what_an_empty_cell_of_the_index_leaves_unknown_is_said(tmp_path):
-    index = "key,temperature_C,stress_MPa,youngs_MPa,state,product\na/1,900,25,,Ruptured,\na/2,950,20,144000,,Base\n"
-    first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": index, "curves.csv": CURVES}))
-    assert "youngs_MPa unknown (empty cell)" in first.labels["assumed"].split(", ")
-    assert "state unknown (empty cell)" in second.labels["assumed"].split(", ")
-    assert "product" not in first.labels["assumed"]
-
-
 def test_any_file_of_the_folder_leads_to_it(tmp_path):
     made = folder(tmp_path, files())
     assert all(INDEXED_FILES.accepts(made / name) for name in ("", "index.csv", "A_creep.csv"))
@@ -151,10 +143,6 @@ def test_files_folders_and_patterns(tests_in_folders):
     (one / "c.csv").write_text("")
     with pytest.raises(HistoryError, match=r"c.csv: the file is empty"):
         read_histories(one, READERS)
-
-
-def test_general_reader_yields_to_another_one(tests_in_folders):
-    assert names(tests_in_folders / "two", [*READERS, Always("lab")]) == ["lab a"]
 
 
 # ---- tests file ------------------------------------------------------------------------------------------------------

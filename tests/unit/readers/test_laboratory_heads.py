@@ -263,21 +263,6 @@ def test_a_remark_that_a_test_did_not_break_makes_no_rupture(tmp_path, name, tex
     assert (ruptured.unruptured, ruptured.rupture_time) == (False, 800 * 3600.0)
 
 
-@pytest.mark.parametrize("text", ["test abgebrochen", "interrupted", "furnace failure", "Kopf abgebrochen", "stopped"])
-def test_a_remark_that_a_test_was_interrupted_is_asked_about(tmp_path, text):
-    with pytest.raises(HistoryError, match=r"t.csv:3: 'remark' says .* did these tests break, .* tests\.toml"):
-        _read(tmp_path, TABLE.format(name="remark", a="", b=text))
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["ruptured in gauge length", "necking", "breakthrough of oxide", "heat X7", "failure outside gauge", "Bruch"],
-)
-def test_other_remarks_are_labels(tmp_path, text):
-    second = _read(tmp_path, TABLE.format(name="remark", a="", b=text))[1]
-    assert (second.labels["remark"], second.rupture_time) == (text, 800 * 3600.0)
-
-
 @pytest.mark.parametrize("mark", ["n.a.", "n/a", "NA", "n.b.", "-", "--", "k.A.", ""])
 def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark):
     table = f"test,stress_MPa,T (C),min creep rate (1/h),t_r (h)\nA,200,800,1e-6,{mark}\nB,220,800,2e-6,800\n"
@@ -289,14 +274,6 @@ def test_marks_of_missing_values_are_empty_where_empty_is_allowed(tmp_path, mark
     (alone,) = _read(tmp_path, head + f"time_h,strain_pct\n1,0.1\n2,{mark}\n3,0.3\n4,0.4\n")
     assert alone.outputs["strain"].tolist() == [0.001, 0.003, 0.004]
     assert "1 reading without a value of 'strain_pct' left out (line" in alone.labels["assumed"]
-
-
-@pytest.mark.parametrize("text", ["nan", "NaN", "inf", "none"])
-def test_numbers_that_were_lost_are_no_missing_values(tmp_path, text):
-    with pytest.raises(HistoryError):
-        _read(
-            tmp_path, f"test,stress_MPa,T (C),min creep rate (1/h),t_r (h)\nA,200,800,1e-6,{text}\nB,220,800,2e-6,8\n"
-        )
 
 
 def test_german_names_and_units(tmp_path):

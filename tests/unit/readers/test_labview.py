@@ -130,10 +130,17 @@ def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_s
     assert "subtracted" in test.labels["assumed"]
 
 
-def test_a_stopped_test(tmp_path: Path):
-    changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": "Time limit"}}
+@pytest.mark.parametrize(
+    ("end", "rupture"),
+    [
+        *((end, 218700.0) for end in ("test piece break", "Specimen rupture", "failure of test piece", "broken")),
+        *((end, None) for end in ("Time limit", "no rupture", "interruption")),
+    ],
+)
+def test_how_a_test_ended(tmp_path: Path, end: str, rupture: float | None):
+    changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": end}}
     (test,) = ck.read_histories(write(tmp_path, document(rupture=value("Not applicable", "h"), **changes)))
-    assert (test.rupture_time, test.unruptured) == (None, True)
+    assert (test.rupture_time, test.unruptured) == (rupture, rupture is None)
 
 
 def test_a_rupture_time_without_a_series(tmp_path: Path):

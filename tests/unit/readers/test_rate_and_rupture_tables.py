@@ -137,6 +137,39 @@ def test_commas_between_thousands(tmp_path):
         assert read(tmp_path, doubtful)[0].times[-1] == pytest.approx(3600 * hours)
 
 
+ANOTHER = [
+    *("Average creep rate (%/h)", "Tertiary creep rate (%/h)", "Kriechgeschwindigkeit bei Bruch (%/h)"),
+    *("vitesse moyenne de fluage (1/h)", "Creep rate at 1000 h (1/h)", "Max. creep rate (1/h)", "Required life (h)"),
+    *("Predicted rupture time (h)", "Mindeststandzeit (h)", "temps à rupture calculé (h)", "Minimum rupture life (h)"),
+    *("Predicted time to 1 % strain (h)", "Expected minimum creep rate (1/h)"),
+]
+
+
+@pytest.mark.parametrize("name", ANOTHER)
+def test_a_rate_that_is_not_the_smallest_and_a_time_that_was_not_measured_are_labels(tmp_path, name):
+    tests = read(tmp_path, f"test;stress (MPa);T (C);{name};t_r (h)\nA;140;550;0.5;800\nB;120;550;0.25;2900\n")
+    assert [(one.minimum_rate, one.rupture_time, one.labels[name]) for one in tests] == [
+        (None, 800 * 3600.0, "0.5"),
+        (None, 2900 * 3600.0, "0.25"),
+    ]
+    with pytest.raises(HistoryError, match=r"no minimum creep rate and no end of the test \(kept as labels: "):
+        read(tmp_path, f"test;stress (MPa);T (C);{name}\nA;140;550;0.5\nB;120;550;0.25\n")
+
+
+@pytest.mark.parametrize(("name", "said"), [("Creep rate (1/h)", True), ("Steady creep rate (1/h)", False)])
+def test_a_rate_of_which_nothing_says_that_it_is_the_smallest_is_said_to_be(tmp_path, name, said):
+    first, _ = read(tmp_path, f"test;stress (MPa);T (C);{name}\nA;140;550;1e-5\nB;120;550;1e-6\n")
+    assert first.minimum_rate == pytest.approx(1e-5 / 3600)
+    assert ("is the minimum creep rate" in first.labels["assumed"]) is said
+
+
+@pytest.mark.parametrize("rows", ["Mean;140;550;950\nStd. dev.;0;0;212", "Mittelwert;;;950", "Écart-type;0;0;212"])
+def test_rows_of_statistics_are_no_tests(tmp_path, rows):
+    tests = read(tmp_path, f"test;stress (MPa);T (C);t_r (h)\nA;140;550;800\nN;140;550;1100\n{rows}\n")
+    assert [one.name for one in tests] == ["A", "N"]
+    assert f"rows of {rows.partition(';')[0]}" in tests[0].labels["assumed"]
+
+
 def test_ends_that_contradict_one_another(tmp_path):
     head = "stress_MPa,temperature_C,t_r_h,ended\n"
     for end, said in (

@@ -190,7 +190,7 @@ REFUSED = [
     ("time_h;strain_pct\n0;0\n1,5;2.5\n1,5;2,5\n", "x.csv:5: 'strain_pct' is '2.5' with a point"),
     ("time_h,strain_1\n0,0%\n1,5%\n", "x.csv:3: 'strain_1' is not in per cent, but its cells are"),
     ("time_h,strain_pct\n0,0\n# stress_MPa: 70\n1,1\n", "x.csv:5: 'stress_MPa' stands below the"),
-    ("time_h,strain_pct\n0,0\n1,1\nMaximum,1\n", "x.csv:6: 'time_h' is 'Maximum'; write a fini"),
+    ("time_h,strain_pct\n0,0\nMaximum,1\n1,1\n", "x.csv:5: 'time_h' is 'Maximum'; write a fini"),
     ("time_h,strain_pct\n0,0\n1,1\nnan,nan\n", "x.csv:6: 'time_h' is 'nan'; write a finite"),
     ("Time (h);A1;A2\n0;0;0\n1;1;1\n", "x.csv:3: the column 'A1' does not say what it"),
     ("Time (h),Strain 1 (%),Strain 2 (%)\n0,0,0\n1,1,1\n", "x.csv:3: several columns of one quan"),

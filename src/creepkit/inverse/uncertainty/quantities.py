@@ -209,7 +209,10 @@ def log_rate(
 def local_exponent(
     coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, **state: ArrayLike | None
 ) -> CoordinateFunction:
-    """The local stress exponent at points; stress, temperature, strain, time : as in `log_rate`, they broadcast."""
+    """The local stress exponent at points.
+
+    stress, temperature : as in `log_rate`, they broadcast to (points,). state : strain and time, numbers or (points,).
+    """
     level = np.asarray(stress, float)
     above, below = (
         log_rate(coordinates, level * f, temperature, **state)
@@ -219,7 +222,10 @@ def local_exponent(
 
 
 def activation_energy(coordinates: Coordinates, stress: ArrayLike, temperature: float) -> CoordinateFunction:
-    """The activation energy -R d ln rate / d(1/T), J/mol, at stresses (points,), MPa, and one temperature, K."""
+    """The activation energy -R d ln rate / d(1/T), J/mol, at points.
+
+    stress : number or (points,) MPa. temperature : one, K.
+    """
     ends = (temperature / ENERGY_TEMPERATURE_RATIO, temperature * ENERGY_TEMPERATURE_RATIO)
     colder, hotter = (log_rate(coordinates, stress, end) for end in ends)
     return lambda u: GAS_CONSTANT * (hotter(u) - colder(u)) / (1 / ends[0] - 1 / ends[1])

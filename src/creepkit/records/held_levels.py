@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from creepkit.inverse.observation_vector import frames_with_data
-from creepkit.records import History, Program
+from creepkit.records.history import History
+from creepkit.records.loading import Program
 
 HELD_TEMPERATURE = 1.0
 """K, within which a temperature is held."""
@@ -49,5 +49,5 @@ def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, 
 
 def last_data_time(history: History) -> float:
     """Time of the last used frame with data, s."""
-    frames = np.flatnonzero(history.used & frames_with_data(history))
+    frames = np.flatnonzero(history.used & history.frames_with_data)
     return float(history.times[frames[-1] if frames.size else -1])
