@@ -40,7 +40,7 @@ BUDGET = {
     "readers": 6424,
     "records": 2390,
     "registry": 608,
-    "reports": 5889,
+    "reports": 5867,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 545,
