@@ -256,7 +256,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     if not np.isfinite([measured, predicted]).all():
         return ""
     over = ends([one.stress for one in rates], 3)
-    return f"exponent, {over} MPa: {measured:.2g} measured, {predicted:.2g} by the law"
+    return f"exponent, {over} MPa: measured {measured:.2g}, law {predicted:.2g}"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------
