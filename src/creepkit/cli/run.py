@@ -100,7 +100,7 @@ def _test_as_options(fit: Identification) -> str:
         return "TESTS"
     point, end = fit.tested_point, fit.ranges["time"][1] / SECONDS_PER_HOUR
     temperature = f" --temperature-c {point.temperature - ZERO_CELSIUS:.0f}"
-    return f"--stress {point.stress:.3g}{temperature} --end-h {end:.3g}"
+    return f"--stress {point.stress:.3g}{temperature} --end-h {float(f'{end:.3g}'):g}"
 
 
 def result_to_json(result: StudyResult) -> dict[str, object]:

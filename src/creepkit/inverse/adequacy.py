@@ -156,7 +156,7 @@ class Adequacy:
 
     @property
     def explanations(self) -> tuple[Explanation, ...]:
-        """Of what rates of tests leave of a law that is contradicted by them or by readings, the likeliest first."""
+        """Of what rates of tests leave of a law that is rejected by them or by readings, the likeliest first."""
         return self.of_rates if self.contradicted_by_rates or self.leaves_readings else ()
 
     @property
@@ -219,7 +219,7 @@ class Adequacy:
 
     @property
     def qualification(self) -> str:
-        """What follows "not contradicted" where it takes nuisances of implausible size; "" where it does not."""
+        """What follows "not rejected" where it takes nuisances of implausible size; "" where it does not."""
         if not self.implausible:
             return ""
         more = len(self.implausible) - 1
@@ -263,14 +263,14 @@ class Adequacy:
             return "?"
         if self.explains:
             large = f", but only with a large {self.implausible[0].kind}" if self.implausible else ""
-            return f"not contradicted ({p_value_text(self.p_value)}){large}"
+            return f"not rejected ({p_value_text(self.p_value)}){large}"
         if self.contradicting is not None:
-            return "contradicted: rates contradict rupture times"
+            return "rejected: rates contradict rupture times"
         noises = self.discrepancy_in_noises
         if self.explanations and (self.lies_in_tests or not noises > 0):
-            return f"contradicted: {self.explanations[0].headline}"
+            return f"rejected: {self.explanations[0].headline}"
         left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
-        return f"contradicted: {left}"
+        return f"rejected: {left}"
 
     def __getitem__(self, output: str) -> OutputAdequacy:
         for one in self.outputs:
@@ -293,9 +293,9 @@ class Adequacy:
             if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
                 scatter += " (far larger than what the readings show: check its unit)"
             found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
-            return f"is not contradicted by the tests at their {source} noise{self.qualification}{scatter}: {found}"
+            return f"is not rejected by the tests at their {source} noise{self.qualification}{scatter}: {found}"
         if self.contradicting is not None and not self.outputs:
-            return f"is contradicted by the tests: {self.contradicting}"
+            return f"is rejected by the tests: {self.contradicting}"
         parts = [
             f"{_amount(o.discrepancy, o.output)} of {o.output} ({noises_text(o.discrepancy_in_noises)} times its "
             f"{o.noise_source} noise)"
@@ -311,7 +311,7 @@ class Adequacy:
             where += f". It would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         if self.explanations and not parts:
             curves = f"; curves agree with the noise ({self._p_value_text})" if self.outputs else ""
-            return f"is contradicted by the rates of the tests: {self.explanation_text}{curves}"
+            return f"is rejected by the rates of the tests: {self.explanation_text}{curves}"
         judged = f"{self._chi_square_text}, {self._p_value_text}"
         rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained: {judged}{where}"
         beside = "" if self.is_explained else "of its rates, "

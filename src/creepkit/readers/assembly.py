@@ -127,7 +127,9 @@ def assemble_history(
         modulus = None if elastic is None else _modulus(elastic, temperature)
         record = without_loading(conditions, frames.times, outputs["strain"], used, stress, modulus)
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
-        elastic = elastic if record.modulus is None else _elastic_of(record.modulus)
+        if record.modulus is not None:  # that the loading ramp showed
+            conditions.put_number("modulus", StatedNumber(record.modulus, "modulus", location))
+            elastic = _elastic(conditions)
     else:
         stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
         elastic_included = stated == "yes"
@@ -350,13 +352,6 @@ def _modulus(elastic: Elastic, temperature: float | Program) -> float:
     """Young's modulus at the beginning, MPa."""
     start = temperature.values[0] if isinstance(temperature, Program) else temperature
     return float(elastic.at(float(start)).E)
-
-
-def _elastic_of(modulus: float) -> Elastic:
-    """Elastic data of a modulus that a record showed."""
-    from creepkit.language.elastic import Elastic
-
-    return Elastic(modulus)
 
 
 _BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "

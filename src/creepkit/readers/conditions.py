@@ -290,12 +290,11 @@ class StatedConditions:
     def _name_specimen(self, entry: SourceText) -> None:
         """A text that is no name, such as `Round bar, 6 mm`, is a label, unless it is a misspelt name."""
         name = entry.text.casefold()
-        if _SMOOTH.search(name) and name not in self.terms.outputs:
-            self._put(self.labels, "specimen", entry.text, entry)
-        elif _NOTCHED.search(name) and name not in self.terms.outputs:
+        is_known, is_smooth = name in self.terms.outputs, _SMOOTH.search(name)
+        if not is_known and not is_smooth and _NOTCHED.search(name):
             what = f"'{quoted(entry.text, 60)}' is said of the specimen; which is it?"
             raise self.question(what, "specimen", "notched-bar", "uniaxial", location=entry.location)
-        elif SPECIMEN_NAME_PATTERN.fullmatch(entry.text) or name in self.terms.outputs:
+        if is_known or (SPECIMEN_NAME_PATTERN.fullmatch(entry.text) and not is_smooth):
             self._put(self._texts, "specimen", replace(entry, text=name), entry)
         elif near := get_close_matches(name, self.terms.outputs, 1, cutoff=CLOSE_SPELLING):
             raise HistoryError(f"{entry.location}: there is no specimen '{entry.text}'; did you mean '{near[0]}'?")

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.errors import HistoryError
+from creepkit.errors import HistoryError, quoted
 from creepkit.readers.conditions import StatedConditions, StatedNumber, TimeValuePairs, errors_located_at
 from creepkit.readers.frames import TableFrames
 from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, Terms
@@ -69,6 +69,7 @@ def read_temperature(conditions: StatedConditions, frames: TableFrames) -> float
 def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
     """The loading: by components, by what has steps and programs alone, else by the first load that is stated."""
     terms, load_kinds = conditions.terms, conditions.terms.load_kinds
+    _ask_of_relaxation(conditions, frames)
     quantities = (*load_kinds, *COMPONENT_LOADING_KINDS)
     with errors_located_at(
         conditions.location_of(*(f"{quantity}{form}" for quantity in quantities for form in _LOADING_SUFFIXES))
@@ -85,6 +86,20 @@ def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
         key = "stress_MPa" if "stress" in stated else ""
         raise conditions.missing_error(f"loading (no {wanted})", _loading_advice(terms, stated), key)
     return loading
+
+
+_REMAINING = re.compile("remaining|residual|relaxed|relaxation|rest-?spannung|résiduelle|restante", re.IGNORECASE)
+
+
+def _ask_of_relaxation(conditions: StatedConditions, frames: TableFrames) -> None:
+    """Ask for the strain that was held in a test whose column is called the remaining stress."""
+    written = next((frames.table.as_written(k) for k, c in enumerate(frames.table.columns) if c[:6] == "stress"), "")
+    if not _REMAINING.search(written) or conditions.states_load("strain") or "strain" in frames.values:
+        return
+    modulus, stress = conditions.number_of("modulus"), float(frames.values["stress"][0])
+    what = f"'{quoted(written, 60)}' is that of a test whose strain was held, which is not stated; how large was it?"
+    likely = [] if modulus is None else [float(f"{100.0 * stress / modulus.value:.4g}")]
+    raise conditions.question(what, "strain_pct", *likely)
 
 
 def _loading_advice(terms: Terms, loads: Sequence[str]) -> str:

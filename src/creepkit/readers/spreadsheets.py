@@ -42,7 +42,7 @@ from creepkit.readers.table import (
     without_logarithms,
     without_thousands,
 )
-from creepkit.readers.table_heads import conditions_in_text, names_time
+from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import SEPARATE, answers_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, unit_suffix, words_of
@@ -242,10 +242,6 @@ def _clock_text(elapsed: timedelta) -> str:
     return f"{hours}:{rest // 60:02d}:{rest % 60:02d}{f'.{part:06d}' if part else ''}"
 
 
-_SECTIONS = re.compile(r'(?:"[^"]*"?|\\.|[^;"\\])*', re.DOTALL)
-"""A section of a number format, up to a semicolon that is neither quoted nor escaped."""
-
-
 _LITERAL = re.compile(r'"([^"]*)"?|\\(.)|_.|\*.|\[[^\]]*\]?', re.DOTALL)
 """Parts of a format that are shown as they stand, the first two, and those of width, filling, colour and condition."""
 
@@ -259,11 +255,9 @@ def number_text(value: float, number_format: str) -> str:
     text = repr(value)
     if "%" not in number_format:
         return text
-    sections = [one for one in _SECTIONS.findall(number_format) if one]
-    section = sections[min(1 if value < 0 else 2 if value == 0 and len(sections) > 2 else 0, len(sections) - 1)]
-    if "%" in _LITERAL.sub("", section):
+    if "%" in _LITERAL.sub("", number_format):
         return f"{Decimal(text).scaleb(2).normalize():f}%"
-    shown = "".join((match[1] or match[2] or "") for match in _LITERAL.finditer(section))
+    shown = "".join((match[1] or match[2] or "") for match in _LITERAL.finditer(number_format))
     return f"{text}%" if shown.strip() == "%" else text
 
 
@@ -341,6 +335,9 @@ class SpreadsheetReader:
         notes, aside = dict[str, SourceText](), list[str]()
         for sheet in (one for one in sheets if one not in framed):
             conditions = _conditions_by_test(sheet, self.vocabulary)
+            if stated := _stated_for_all(sheet, self.vocabulary):
+                tests = [_with_entries(one, stated) for one in tests]
+                continue
             states = any(not key.startswith("label ") for entries in conditions.values() for key in entries)
             if states or any(_agreement(key, test) for key in conditions for test in tests):
                 titles = _titles(sheet, self.vocabulary.terms())
@@ -456,13 +453,28 @@ def _with_conditions(
         what = f"{said}; correct it, or is sheet '{sheet.sheet}' to be left out?"
         raise Question(sheet.path, where, what, "columns", [{sheet.sheet: UNUSED}])
     for test, keys in zip(tests, found, strict=True):
-        extra = stated[keys[0]] if keys else {}
-        for key in extra.keys() & test.entries.keys():
-            if not extra[key].says_the_same(test.entries[key]):
-                what = f"'{key}' is {quoted(extra[key].text, 60)}, and {test.entries[key].location} says another one"
-                raise HistoryError(f"{extra[key].location}: {what}; correct one of them")
         table = replace(test.table, sources=(*test.table.sources, *titles))
-        yield replace(test, entries={**test.entries, **extra}, table=table)
+        yield _with_entries(replace(test, table=table), stated[keys[0]] if keys else {})
+
+
+def _with_entries(test: TabulatedTest, extra: Mapping[str, SourceText]) -> TabulatedTest:
+    """A test with more that is said of it; HistoryError where it says another value itself."""
+    for key in extra.keys() & test.entries.keys():
+        if not extra[key].says_the_same(test.entries[key]):
+            what = f"'{key}' is {quoted(extra[key].text, 60)}, and {test.entries[key].location} says another one"
+            raise HistoryError(f"{extra[key].location}: {what}; correct one of them")
+    return replace(test, entries={**test.entries, **extra})
+
+
+def _stated_for_all(sheet: CellTable, vocabulary: HeaderVocabulary) -> dict[str, SourceText]:
+    """Keys with their values, of which a sheet holds nothing else; {} of any other sheet."""
+    head, filled = HeadOfTest(sheet, vocabulary.terms()), [[*filter(None, row.cells)] for row in sheet.rows]
+    stated = [one for one in filled if 1 < len(one) < 4 and head.known.is_condition(one[0].rstrip(": "))]
+    if max(map(len, filled)) > 3 or 2 * len(stated) <= len(filled):
+        return {}
+    for row in sheet.rows:
+        head.read(row)
+    return head.entries
 
 
 SPREADSHEET = SpreadsheetReader("xlsx", "a spreadsheet .xlsx: a test a sheet, or several side by side")

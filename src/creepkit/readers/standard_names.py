@@ -15,8 +15,9 @@ or `Time of day`, or the values: elapsed are times that begin below one hour or 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -240,56 +241,39 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
         raise HistoryError(f"{place}: {what}; leave the unit out of the name, or write numbers")
     pattern = _PATTERN.search(written)
     units = [_SECONDS[one[0]] for one in pattern[0].lower().split(":")] if pattern else []
-    if units and units != [*_SECONDS.values()][1:] and words_of(split_written_name(written)[0]) not in OF_DAY:
-        return _with_times_by_pattern(table, clock, units)
-    elapsed = [_ELAPSED.fullmatch(cell) for cell in cells]
-    if elapsed[0]:
-        seconds, assumption = _times_of(elapsed, table, clock, known.vocabulary.synonyms)
+    if units and units != _H_MM_SS and words_of(split_written_name(written)[0]) not in OF_DAY:
+        seconds, assumption = _seconds_of(table, clock, units), ""
+    elif _ELAPSED.fullmatch(cells[0]):
+        seconds, assumption = _times_of(table, clock, known.vocabulary.synonyms)
     else:
         seconds, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
-    return _with_seconds(table, clock, seconds).assuming(*filter(None, (assumption,)))
+    texts = [repr(float(time)).replace(".", table.dialect.decimal) for time in seconds]
+    return table.renamed(columns).with_cells(clock, "time_s", texts).assuming(*filter(None, (assumption,)))
 
 
 _PATTERN = re.compile(r"(?<![a-z])(?:d+|h+|mm?|min):(?:hh?|mm?|min|ss?)(?::(?:mm?|min|ss?))?(?![a-z])", re.IGNORECASE)
 _SECONDS = {"d": DAY, "h": 3600.0, "m": 60.0, "s": 1.0}
-"""Of what the name of a column says that its cells show, as `hh:mm`, `mm:ss` and `dd:hh:mm`."""
+_H_MM_SS = [3600.0, 60.0, 1.0]
+"""Of what the name of a column says that its cells show, as `hh:mm`, `mm:ss` and `dd:hh:mm`; and by default."""
 
 
-def _with_seconds(table: CellTable, clock: int, seconds: Iterable[float]) -> CellTable:
-    """The table with times in s (rows,) in the place of a column."""
-    columns = ["time_s" if k == clock else name for k, name in enumerate(table.columns)]
-    texts = [repr(float(time)).replace(".", table.dialect.decimal) for time in seconds]
-    rows = [
-        TableRow(row.line, [text if k == clock else cell for k, cell in enumerate(row.cells)])
-        for row, text in zip(table.rows, texts, strict=True)
-    ]
-    return replace(table.renamed(columns), rows=rows)
-
-
-def _with_times_by_pattern(table: CellTable, clock: int, units: Sequence[float]) -> CellTable:
-    """The table with times in the place of cells such as 4:04:00; units : s, of each of their parts."""
-    seconds = list[float]()
+def _seconds_of(table: CellTable, clock: int, units: Sequence[float]) -> Floats:
+    """(rows,) s of cells such as 4:04:00; units : s, of each of their parts, all less than one before."""
+    seconds, most = list[float](), [np.inf, *(a / b for a, b in pairwise(units))]
     for row in table.rows:
-        parts = row.cells[clock].split(":")
-        if len(parts) != len(units) or not all(is_number(part, Dialect()) for part in parts):
-            name = table.as_written(clock)
-            what = f"'{quoted(row.cells[clock])}' is not as '{name}' says; write all cells alike"
-            raise HistoryError(f"{table.location(row.line, clock)}: {what}")
-        seconds.append(sum(unit * float(part) for unit, part in zip(units, parts, strict=True)))
-    return _with_seconds(table, clock, seconds)
+        parts = [part.replace(",", ".") for part in row.cells[clock].split(":")]
+        numbers = [float(part) for part in parts if is_number(part, Dialect())]
+        if len(numbers) != len(units) or any(one >= limit for one, limit in zip(numbers, most, strict=True)):
+            what = f"'{table.as_written(clock)}' is '{quoted(row.cells[clock])}'"
+            form = "h:mm:ss as above" if units == _H_MM_SS else "all cells as its name says"
+            raise HistoryError(f"{table.location(row.line, clock)}: {what}; write {form}")
+        seconds.append(sum(unit * number for unit, number in zip(units, numbers, strict=True)))
+    return np.array(seconds)
 
 
-def _times_of(
-    elapsed: Sequence[re.Match[str] | None], table: CellTable, clock: int, synonyms: Mapping[str, str]
-) -> tuple[Floats, str]:
+def _times_of(table: CellTable, clock: int, synonyms: Mapping[str, str]) -> tuple[Floats, str]:
     """(rows,) s of times h:mm:ss, elapsed or of the day, and what was assumed of them."""
-    seconds, name = [], table.as_written(clock)
-    for row, match in zip(table.rows, elapsed, strict=True):
-        if match is None:
-            place = table.location(row.line, clock)
-            raise HistoryError(f"{place}: '{name}' is '{quoted(row.cells[clock])}'; write h:mm:ss as above")
-        seconds.append(3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", ".")))
-    times = np.array(seconds)
+    name, times = table.as_written(clock), _seconds_of(table, clock, _H_MM_SS)
     meant = synonyms.get(name, name)
     if words_of(meant) in OF_DAY:
         times = through_midnight(times)[0]

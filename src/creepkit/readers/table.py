@@ -42,7 +42,7 @@ MAXIMUM_CELL = 10_000
 """Characters of a cell, in which units are looked for."""
 
 
-_POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
+POINT_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)
 """Beside decimal commas 1.234 may be 1234."""
 
 
@@ -67,7 +67,7 @@ class SourceText:
     def number(self, name: str) -> float:
         """The text as a finite number; `name` says in the error what it was meant to be."""
         dialect = Dialect(decimal=self.decimal)
-        if self.decimal == "," and not is_number(self.text, dialect) and not _POINT_OF_THOUSANDS.fullmatch(self.text):
+        if self.decimal == "," and not is_number(self.text, dialect) and not POINT_OF_THOUSANDS.fullmatch(self.text):
             dialect = Dialect()
         return parse_number(self.text, dialect, self.location, name)
 
@@ -188,6 +188,12 @@ class CellTable:
         columns = [self.columns[k] for k in kept]
         return replace(self, columns=columns, rows=with_columns(self.rows, kept), positions=places)
 
+    def with_cells(self, column: int, name: str, texts: Sequence[str]) -> CellTable:
+        """The table with other cells (rows,) and another name in a column."""
+        parts = zip(self.rows, texts, strict=True)
+        rows = [TableRow(r.line, [text if k == column else c for k, c in enumerate(r.cells)]) for r, text in parts]
+        return replace(self, rows=rows, columns=[name if k == column else c for k, c in enumerate(self.columns)])
+
     def assuming(self, *assumptions: str) -> CellTable:
         """The table with more that was assumed of it."""
         return replace(self, assumptions=(*self.assumptions, *assumptions))
@@ -217,30 +223,33 @@ def dialect_of(lines: Iterable[str], path: Path, place: str, decimal: str | None
         raise Question(path, place, two_readings(error.number), "decimal", ("comma", "point")) from None
 
 
-_THOUSANDS, _WITH_COMMA = (
-    re.compile(rf"[<>≥(\[]*\s*[+-]?{digits}\s*[+*†)\]h→]*") for digits in (r"[1-9]\d{0,2}(?:,\d{3})+", r"\d*,\d+")
+_THOUSANDS, _WITH_SIGN = (
+    {sign: re.compile(rf"[<>≥(\[]*\s*[+-]?{digits.format(sign)}\s*[+*†)\]h→]*") for sign in (",", ".")}
+    for digits in (r"[1-9]\d{{0,2}}(?:[{}]\d{{3}})+", r"\d*[{}]\d+")
 )
-"""Numbers with commas, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
+"""By a sign, numbers with it, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
 
 
 def without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
-    """The table with decimal points without the commas between thousands of its numbers.
+    """The table without the signs between thousands of its numbers, a comma where its decimal sign is a point.
 
-    They are if the decimal point is stated (is_stated), or if several numbers have a comma, each before three digits;
-    a single one is asked about.
+    They are if the decimal sign is stated (is_stated), or if several numbers have a comma, each before three digits; a
+    single one is asked about.
     """
-    if table.dialect.decimal != ".":
-        return table
-    commas = [(row, cell) for row in table.rows for cell in row.cells if "," in cell]
-    found = [(row, cell) for row, cell in commas if _THOUSANDS.fullmatch(cell)]
-    if not found or any(_WITH_COMMA.fullmatch(cell) and not _THOUSANDS.fullmatch(cell) for _, cell in commas):
+    sign = "," if table.dialect.decimal == "." else "."
+    signed = [(row, cell) for row in table.rows for cell in row.cells if sign in cell]
+    found = [(row, cell) for row, cell in signed if _THOUSANDS[sign].fullmatch(cell)]
+    others = [c for _, c in signed if _WITH_SIGN[sign].fullmatch(c) and not _THOUSANDS[sign].fullmatch(c)]
+    if not found or others or (sign == "." and not is_stated):
         return table
     row, cell = found[0]
     if len(found) == 1 and cell.count(",") == 1 and not is_stated:
         raise Question(table.path, table.location(row.line), two_readings(cell), "decimal", ("point",))
-    plain = {one: one.replace(",", "") for _, one in found}
+    plain = {one: one.replace(sign, "") for _, one in found}
     rows = [TableRow(row.line, [plain.get(one, one) for one in row.cells]) for row in table.rows]
-    return replace(table, rows=rows).assuming(f"commas stand between thousands ({plain[cell]})")
+    return replace(table, rows=rows).assuming(
+        f"{'commas' if sign == ',' else 'points'} stand between thousands ({plain[cell]})"
+    )
 
 
 # ---- comments ------------------------------------------------------------------------------------------------------

@@ -123,8 +123,7 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
     rest = enumerate(table.rows[at + 1 :], at + 1)
     end = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
-    widest = max((row.cells for row in table.rows[at:end]), key=len)
-    frames = with_commas_of_remarks(table, table.rows[end:], widest)
+    frames = with_commas_of_remarks(table, table.rows[end:], max((row.cells for row in table.rows[at:end]), key=len))
     table = replace(table, rows=[*table.rows[:end], *frames])
     numbered = [name for k, name in enumerate(table.rows[at].cells) if _numbers_readings(table, at, k, known)]
     table = table.assuming(*(f"'{quoted(name, 40)}' numbers the readings" for name in numbered))

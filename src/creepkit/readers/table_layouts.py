@@ -102,13 +102,8 @@ def with_days(table: CellTable, known: Terms) -> CellTable:
     joined = [f"{row.cells[day].removesuffix(' 00:00:00')} {row.cells[clock]}" for row in table.rows]
     if not all(is_clock_time(text) and not is_number(text.partition(" ")[0], Dialect()) for text in joined):
         return table
-    rows = [
-        TableRow(row.line, [text if k == clock else cell for k, cell in enumerate(row.cells)])
-        for row, text in zip(table.rows, joined, strict=True)
-    ]
-    columns = ["timestamp" if k == clock else name for k, name in enumerate(table.columns)]
     table = table.assuming(f"'{table.columns[day]}' and '{table.columns[clock]}' are one time")
-    return replace(table, rows=rows, columns=columns).keeping([k for k in range(len(columns)) if k != day])
+    return table.with_cells(clock, "timestamp", joined).keeping([k for k in range(len(names)) if k != day])
 
 
 def without_clocks(table: CellTable, known: Terms) -> CellTable:

@@ -32,6 +32,7 @@ from creepkit.readers.columns_of_tests import (
 from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Answer, Question, collected
 from creepkit.readers.table import (
+    POINT_OF_THOUSANDS,
     CellTable,
     SourceText,
     TableRow,
@@ -40,6 +41,7 @@ from creepkit.readers.table import (
     without_ignored,
 )
 from creepkit.readers.table_heads import conditions_in_text, sources_of_names
+from creepkit.readers.tests_file import answers_of
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
     HeaderVocabulary,
@@ -249,6 +251,8 @@ class TestTable:
             column, cells = TestColumn() if is_label else column_called(meant), [row.cells[k] for row in self.rows]
             if column == TestColumn("rupture") and {cell.casefold() for cell in cells} <= {"", "-", *YES, *NO}:
                 column = TestColumn()
+            if column.kind is TIME:
+                collected(self.errors, partial(self._ask_of_points, written, cells))
             if kind := column.kind:
                 column = replace(column, unit=column.unit or _unit_of_cells(cells))
                 if kind is TIME and not column.unit and (unit := unit_of_times(self.notes)):
@@ -294,6 +298,14 @@ class TestTable:
         is_named = any(column_called(name).quantity == "name" for name in self.names) or name in self.vocabulary.labels
         is_told = len(set(texts)) == len(texts) and not {text.casefold() for text in texts} & kinds
         return may_name and is_told and not is_named
+
+    def _ask_of_points(self, written: str, cells: Sequence[str]) -> None:
+        """Ask of 12.345 and 23.456 beside whole numbers alone, where nothing states the decimal sign."""
+        points = [cell for cell in cells if "." in cell]
+        are_doubtful = len(points) > 1 and all(map(POINT_OF_THOUSANDS.fullmatch, points))
+        if are_doubtful and len(points) < sum(map(bool, cells)) and not answers_of(self.table.path).decimal:
+            readings = f"'{points[0]}' in '{quoted(written, 60)}' may be {points[0]} or {points[0].replace('.', '')}"
+            raise self.question(readings, "decimal", ("comma", "point"))
 
     def _twice(self, written: str, other: str) -> HistoryError:
         what = f"'{quoted(other, 60)}' and '{quoted(written, 60)}' mean the same; keep one of them"

@@ -24,23 +24,11 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
-from creepkit.reports.blocks import (
-    MOST_NAMED,
-    Answer,
-    Rich,
-    Table,
-    as_text,
-    ends,
-    listed,
-    named,
-    number,
-    plural,
-    printable,
-)
-from creepkit.reports.description import tested_range, tests_text
+from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
+from creepkit.reports.description import rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import ALL_DIGITS, BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
+from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -142,11 +130,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    over = ends([one.stress for one in rates], 3) if rates else ""
-    by_tests = f"{measured:.2g} by minimum rates over {over} MPa" if math.isfinite(measured) else ""
+    by_tests = f"{measured:.2g} over all tests" if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{by_rates.text} by minimum rates" if math.isfinite(heat) else ""
+        by_tests = f"{by_rates.text} over all tests" if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
@@ -208,7 +195,7 @@ def time_figure(one: TimeForecast) -> KeyFigure:
     inside = {True: "inside", False: "outside", None: ""}[one.inside]
     said = [f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}"] * math.isfinite(one.measured)
     if math.isfinite(one.value) and abs(one.value - one.median) > OTHER_MEDIAN * one.median:
-        said.append(FORECAST["by values"].format(hours=hours_number(one.value)))
+        said.append(FORECAST["by values"].format(hours=_written_out(one.value / SECONDS_PER_HOUR, 3)))
     hours = (one.median, one.low, one.high)
     return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", "; ".join(said))
 
@@ -259,8 +246,7 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
     tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
     of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # so that another law may be better
-    return list(dict.fromkeys([*of_law, *(_held(others) if rejected else ()), *_data(quality)]))
+    return list(dict.fromkeys([*of_law, *(_held(others) if rejected(fit) else ()), *_data(quality)]))
 
 
 def _of_tests(fit: Identification) -> Iterator[str]:
@@ -358,15 +344,14 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
-    rejected = fit.adequacy is not None and fit.adequacy.rejects  # whose exponents are not those of the tests
-    by = "by this law the tests" if rejected else "the tests"
+    by = "by this law the tests" if rejected(fit) else "the tests"
     for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
         names = [e.name for e in fit.estimates if e.verdict == verdict]
         if names:
             yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    if far is not None and not rejected and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
+    if far is not None and not rejected(fit) and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
         yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
     change = combined_change_text(fit.unmodelled)
     if change:
@@ -416,7 +401,7 @@ def answer(
         next_step(fit, ranking, searched),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
-        units=f"{Answer.units}{other}; {ALL_DIGITS}",
+        units=f"{Answer.units}{other}",
         **page,
     )
 

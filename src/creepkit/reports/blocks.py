@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
+from creepkit.reports.words import ALL_DIGITS
+
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
 
@@ -337,7 +339,8 @@ def _answer_lines(answer: Answer) -> list[str]:
             " ".join([f"{name} = {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
             for name, value, ends, unit in answer.values
         ]
-        pieces += [f"({answer.units}{'' if intervals else '; intervals: in the details'})"] if pieces else []
+        elsewhere = ALL_DIGITS.format(more="" if intervals else " and intervals")
+        pieces += [f"({answer.units}; {elsewhere})"] if pieces else []
         law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
         said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
         remarks = [*map(_indented, answer.remarks)]

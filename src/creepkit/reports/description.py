@@ -1,6 +1,6 @@
 """How well a law describes and predicts its tests, in the units of who made them, whatever chi-square says of it.
 
-Real tests contradict almost every law; a law that is contradicted and predicts within a few per cent is useful. Rates
+Real tests reject almost every law; a law that is rejected and predicts within a few per cent is useful. Rates
 are those of tests the law has not seen: each is compared with what the others say of it.
 """
 
@@ -17,6 +17,7 @@ from creepkit.reports.blocks import ends, plural, plural_of
 from creepkit.reports.words import HEADLINES, TRUTHS
 
 if TYPE_CHECKING:
+    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.identification import Identification
 
 LARGEST_PER_CENT = 0.5
@@ -91,11 +92,16 @@ def headline(fit: Identification) -> str:
     )
     values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
     values["described"] = f"; {' and '.join(misfits)} so far" if items else ""
-    contradicted = adequacy is not None and adequacy.rejects and not adequacy.lies_in_tests
-    kind = f"{'between' if contradicted else 'use'}{' in part' * bool(bad)}"
+    in_tests = adequacy is not None and adequacy.lies_in_tests
+    kind = f"{'between' if rejected(fit) and not in_tests else 'use'}{' in part' * bool(bad)}"
     kind = kind if good else "use nothing" if bad else "fitted"
-    found = fit.converged or (adequacy is not None and adequacy.lies_in_tests)  # a cause goes before the search
+    found = fit.converged or in_tests  # a cause goes before the search
     return HEADLINES[kind if found else "not found"].format(**values)
+
+
+def rejected(fit: Identification | TemperatureLaw) -> bool:
+    """Whether the tests reject the law, so that what it says of them, rates and exponents, is not theirs."""
+    return fit.adequacy is not None and fit.adequacy.rejects
 
 
 def tested_range(fit: Identification) -> str:

@@ -40,6 +40,7 @@ from creepkit.reports.compared_values import (
     judged_readings,
     misfit_of,
 )
+from creepkit.reports.description import rejected
 from creepkit.reports.identification_plot import residual_caption, small_multiples
 from creepkit.reports.rate_panels import rupture_rows
 
@@ -71,11 +72,6 @@ def identification_text(fit: Identification) -> str:
     head.append(Items([one.line for one in key_figures(fit)]))
     formulas = [Formula(one) for one in equations(fit.law)]
     return as_text([*head, *formulas, *value_blocks(fit), *blocks_of_tests(fit, None), *noise_blocks(fit)])
-
-
-def rejected(fit: Identification) -> bool:
-    """Whether the tests reject the law, so that what it says of them, rates and exponents, is not theirs."""
-    return fit.adequacy is not None and fit.adequacy.rejects
 
 
 # ---- values and verdict ----------------------------------------------------------------------------------------------
@@ -125,7 +121,7 @@ def _values(fit: Identification) -> Table:
     held = ", if the law held" if rejected(fit) else ""
     last = f"by these tests{held or ', given this law'}"
     columns = ("parameter", "meaning", "value", f"95 % interval{held}", "unit", last)
-    caption = "values for stress in MPa as a ratio to 1 MPa, and time in s as a ratio to 1 s"
+    caption = "values to ten digits (JSON has all), for stress as a ratio to 1 MPa and time as a ratio to 1 s"
     return Table(f"{'a law that does not fit the tests: ' * bool(held)}{caption}", columns, rows, numeric=(2, 3))
 
 

@@ -53,7 +53,7 @@ PANEL_WIDTH, PANEL_HEIGHT = 4.1, 3.4
 """Inches of a panel of an answer: so small that a telephone shows it as it was drawn."""
 
 
-LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), ((2.0, -3.0), (-19.0, 1.0), (2.0, 6.0))
+LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), ((2.0, -3.0), (2.0, 6.0), (2.0, -12.0))
 """Points of a label, and where it may stand beside the end of its curve; one that would cover others is left out."""
 
 

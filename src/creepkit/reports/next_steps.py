@@ -13,6 +13,7 @@ from creepkit.records import SECONDS_PER_HOUR
 from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import named
+from creepkit.reports.description import rejected
 from creepkit.reports.words import NEXT, TRY
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
         return in_tests.next_step
     if adequacy is not None and adequacy.remedies:
         return NEXT["remedy"].format(remedy=adequacy.remedies[0])
-    if adequacy is not None and adequacy.rejects:
+    if rejected(fit):
         if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])
         kind = "laws" if len(laws) < 2 else "search laws" if are_bars(fit) else "within"

@@ -101,7 +101,7 @@ def _behind(ranking: Ranking) -> list[str]:
             kind = "left out" if one.fit.law.name in ranking.further else "unpredicted"
         if smaller and not one.same_as and (kind != "readings" or math.isfinite(more)):
             values = {"law": one.fit.law.name, "what": listed(smaller)}
-            found.append(COMPARED[kind].format(**values, more=number(more, 2), excess=number(one.excess, 2)))
+            found.append(COMPARED[kind].format(**values, more=number(more, 3), excess=number(one.excess, 3)))
     return found[:MOST_BEHIND]
 
 

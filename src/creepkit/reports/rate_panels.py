@@ -17,6 +17,7 @@ from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.records.held_levels import held_temperatures
 from creepkit.reports.blocks import ends
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
+from creepkit.reports.description import rejected
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
 
 if TYPE_CHECKING:
@@ -227,9 +228,9 @@ def compared_minimum_rates(fit: Identification) -> list[MinimumRate]:
     These are laws with internal variables or of strain or time, laws that the tests reject, and laws of tests that
     were followed to rupture. There are none where fewer than half of the tests show a minimum rate.
     """
-    law, rejected = fit.law, getattr(fit.adequacy, "rejects", False)
+    law = fit.law
     changing = bool(law.states) or law.uses(strain) or law.uses(time)
-    if not (changing or rejected or any(m.rupture is not None for m in fit.tests)):
+    if not (changing or rejected(fit) or any(m.rupture is not None for m in fit.tests)):
         return []
     try:
         rates = minimum_rates_of(fit)
@@ -255,7 +256,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     if not np.isfinite([measured, predicted]).all():
         return ""
     over = ends([one.stress for one in rates], 3)
-    return f"exponent, {over} MPa: {measured:.2g} measured, {predicted:.2g} by the law"
+    return f"exponent, {over} MPa: measured {measured:.2g}, law {predicted:.2g}"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import equations, unit_text, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
+from creepkit.reports.description import rejected
 from creepkit.reports.figures import panel_grid, place_legend, span
 
 if TYPE_CHECKING:
@@ -137,15 +138,14 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     """Verdict, equations, values, and with `figures` the parameters over temperature; forms and combinations."""
     low, high = law.temperature_range
     adequacy, count = law.adequacy, law.isothermal_estimates.temperatures.size
-    rejected = adequacy is not None and adequacy.rejects
-    of_law = "; what follows are values and trends of a law that does not fit the tests" if rejected else ""
+    of_law = "; what follows are values and trends of a law that does not fit the tests" if rejected(law) else ""
     blocks: list[Block] = [] if adequacy is None else [Paragraph(f"the law {adequacy}{of_law}")]
     blocks += [Formula(one) for one in equations(law.law)]
     chosen = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
     found = f"found from {count} temperatures, {celsius_text(low, high)}, and valid between them"
     blocks.append(Paragraph(f"{found}: the parameters follow these forms best: {chosen}; T_ref = {law.T_ref:.2f} K"))
     rows = [
-        (e.name, *value_cells(law.law, e), unit_text(e.unit), "the law does not fit" if rejected else e.verdict)
+        (e.name, *value_cells(law.law, e), unit_text(e.unit), "the law does not fit" if rejected(law) else e.verdict)
         for e in law.estimates
     ]
     columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
@@ -199,13 +199,7 @@ def study_blocks(study: TemperatureStudy, figures: PageFigures, of: str = "") ->
     """The temperature law, where there is one, the moduli, and the notes; that the joint fit is rejected, if it is."""
     law, fit = study.temperature_law, study.joint_fit
     blocks: list[Block] = []
-    if (
-        law is not None
-        and law.adequacy is None
-        and fit is not None
-        and fit.adequacy is not None
-        and fit.adequacy.rejects
-    ):
+    if law is not None and law.adequacy is None and fit is not None and rejected(fit):
         blocks.append(Paragraph(f"the law {fit.adequacy}; what follows are values and trends of that law alone"))
     blocks += [] if law is None else law_blocks(law, figures, of)
     blocks += [] if study.moduli_fit is None else [Verbatim("Young's modulus", str(study.moduli_fit))]

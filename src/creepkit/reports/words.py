@@ -49,7 +49,7 @@ CAUTIONS = {
     "rejected": "the tests reject it as the exact law: {reason}",
     # a simulation ends before a reading, or gives no number
     "unpredicted": "it does not predict every reading of {tests}",
-    # a thickness, offset or drift of usual size takes the contradiction away
+    # a thickness, offset or drift of usual size takes the rejection away
     "remedy": "it would explain the tests with {remedy}, which nobody modelled",
     # a nuisance lies three standard deviations from what was stated
     "implausible": "it takes {nuisance}, far from what was stated",
@@ -89,11 +89,11 @@ REASONS = {
 NEXT = {
     # the search did not converge
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
-    # the law is contradicted, and one that was not tried has what it lacks
+    # the law is rejected, and one that was not tried has what it lacks
     "law": "try {law} as well, for {why}",
-    # it is contradicted, and no other was tried
+    # it is rejected, and no other was tried
     "laws": "compare it with other laws that suit the tests (creepkit init)",
-    # it is contradicted, others were tried, and the tests are creep curves of bars
+    # it is rejected, others were tried, and the tests are creep curves of bars
     "search laws": "search laws that nobody wrote down (creepkit identify TESTS --search)",
     # so it is, and they are not, or a search tried them
     "within": "forecast between the tests only (creepkit predict): beyond them its misfit grows",
@@ -107,7 +107,7 @@ NEXT = {
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
-    # what nobody modelled, of usual size, takes the contradiction away; or the true stress held in place of the load
+    # what nobody modelled, of usual size, takes the rejection away; or the true stress held in place of the load
     "remedy": "find out whether there was {remedy}: the law would then explain the tests",
     # parameters are not determined, and a bar would do it
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
@@ -126,7 +126,7 @@ BRACKETS = (
 """Below the numbers of an answer."""
 
 
-ALL_DIGITS = "all digits: details, files"
+ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
 
 
@@ -147,7 +147,7 @@ COMPARED = {
     # it gives no number for some readings
     "unpredicted": "{law} has the smaller misfit of {what}, but does not predict every test",
     # below their table
-    "chi-square": "chi-square is that of all values under one estimated covariance, a verdict's over the noise alone",
+    "chi-square": "laws are ranked by all readings under one covariance, not by mean misfits; verdicts by noise alone",
 }
 """{kind: what is said of laws that were compared}."""
 
@@ -194,7 +194,7 @@ FORECAST = {
     "right": "if the law is right",
     # of several
     "one right": "if one of these laws is right, with these weights",
-    # of a contradicted one
+    # of a rejected one
     "wider": "wider by what the law misses",
     # of several tests
     "some beyond": "{count} of them extrapolated beyond the tests",
@@ -202,13 +202,13 @@ FORECAST = {
     "outside": "what was measured of {tests} lies outside its band or interval",
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
-    # a caution, of a contradicted law
+    # a caution, of a rejected law
     "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals allow for {here} here",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
     "next beyond": "make a test nearer to it (creepkit design)",
-    # the law is contradicted
+    # the law is rejected
     "next contradicted": "look for a law that the tests do not reject (creepkit identify TESTS --search)",
     # the largest part is none of the law's
     "next fixed": "plan with the interval: most of it is {part}, which no further test makes smaller",

@@ -148,7 +148,7 @@ def test_straight_lines_under_load_have_the_exponent_of_their_rates():
     (exponent,) = (one for one in fit.estimates if one.name == "n")
     assert exponent.value == pytest.approx(4.0, abs=0.05)
     assert 2.0 < exponent.low < 4.0 < exponent.high < 6.0
-    assert "by the rates" not in fit.headline
+    assert "by the rates" not in str(fit)
 
 
 def test_noise_of_a_smooth_sparse_curve_is_small():

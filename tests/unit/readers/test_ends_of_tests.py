@@ -127,8 +127,8 @@ SENTENCES = {
         *("last reading before fracture", "Bruch des Gestänges"),
     ),
     "ruptured": (
-        *("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "gerissen", "premature failure"),
-        *("not interrupted, ran to rupture", "Bruch der Probe", "rupture de l'éprouvette", "broke near the fillet"),
+        *("ruptured without necking", "Bruch ohne Einschnürung", "uncensored", "not interrupted, ran to rupture"),
+        *("Bruch der Probe", "rupture de l'éprouvette", "broke near the fillet", "gerissen", "premature failure"),
     ),
     "": ("necking", "heat X7", "thermocouple replaced", "Probe hält noch", "creep of a disc 8 mm dia"),
 }

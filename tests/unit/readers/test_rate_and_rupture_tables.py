@@ -107,17 +107,16 @@ def test_bad_tables_are_refused_in_one_sentence(tmp_path):
 
 LONGER = [
     "rupture_h,heat\nA1,120,750,8200,5,X7\nA2,100,750,12500,X8",
-    "rupture_h,grain size\nA1,120,750,8200,5,40\nA2,100,750,12500,41",
     "rupture_h,heat,remark\nA1,120,750,8200,5,X7,broke\nA2,100,750,12500,X8,broke",
     "rupture_h\nA1,120,750,8200,5\nA2,100,750,12500",
 ]
 
 
-@pytest.mark.parametrize("rows", LONGER)
-def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path, rows):
+def test_a_row_of_more_cells_than_names_in_a_table_with_commas_is_refused(tmp_path):
     """8200,5 h without quotes takes two cells, and had been read as 8200 h; commas of a last remark are its own."""
-    with pytest.raises(HistoryError, match=r"table.csv:2: number of cells \d, of columns \d; .* decimal comma"):
-        read(tmp_path, f"test,stress_MPa,temperature_C,{rows}\n")
+    for rows in LONGER:
+        with pytest.raises(HistoryError, match=r"table.csv:2: number of cells \d, of columns \d; .* decimal comma"):
+            read(tmp_path, f"test,stress_MPa,temperature_C,{rows}\n")
     text = "test,stress_MPa,temperature_C,rupture_h,remark\nA1,120,750,8200,broke, necked\nA2,100,750,9000,broke\n"
     assert read(tmp_path, text)[0].labels["remark"] == "broke, necked"
 

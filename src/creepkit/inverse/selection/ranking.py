@@ -121,7 +121,7 @@ class Ranking(Presentable, Plotted, Tabulated):
     @property
     def adequacy_text(self) -> str:
         """What the tests say of the best law, in words that begin with "it"."""
-        return "whether the tests contradict it is not known" if self.adequacy is None else f"it {self.adequacy}"
+        return "whether the tests reject it is not known" if self.adequacy is None else f"it {self.adequacy}"
 
     @property
     def credible(self) -> tuple[RankedLaw, ...]:
@@ -215,14 +215,14 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
         return f"none of {count} laws tried explains the tests{stated}. The best, {best} ({weight}{others}), {adequacy}"
     if "asked" in unmet and adequacy is not None and adequacy.explains:
         asked, more = count - len(ranking.further), len(ranking.further)
-        found = f"of {more} more that were tried, {best} is not contradicted by them ({weight})"
+        found = f"of {more} more that were tried, {best} is not rejected by them ({weight})"
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
         return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
         found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}{lost}"
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if named and ranking.singled_out and adequacy is not None:
-        explains = f"is not contradicted by the tests{adequacy.qualification}"
+        explains = f"is not rejected by the tests{adequacy.qualification}"
         return f"of {count} laws tried {best} has nearly all the weight ({weight}) and {explains}; but {named}"
     reasons = dict.fromkeys([ranking.adequacy_text, *(why for name, why in unmet.items() if name != "convergence")])
     return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"

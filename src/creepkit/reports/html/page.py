@@ -31,20 +31,13 @@ from creepkit.reports.blocks import (
     sentence,
     typeset,
 )
-from creepkit.reports.description import tests_text
+from creepkit.reports.description import rejected, tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
 from creepkit.reports.forecast import forecast_answer, forecast_blocks
 from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
-from creepkit.reports.identification import (
-    blocks_of_tests,
-    noise_blocks,
-    rejected,
-    scatter_of_rates,
-    value_blocks,
-    worst_tests,
-)
+from creepkit.reports.identification import blocks_of_tests, noise_blocks, scatter_of_rates, value_blocks, worst_tests
 from creepkit.reports.identification_plot import summary_figures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames

@@ -259,7 +259,7 @@ def test_what_is_not_predicted_has_no_positive_verdict():
         found = ranking_of(more.pop("weights"), [missing, missing], **more)
         assert not found.singled_out
         assert not found.decisive
-        assert "not contradicted" not in found.verdict
+        assert "not rejected" not in found.verdict
         assert "it does not predict every reading of test 'bar 1' and 1 more" in found.verdict
 
 
