@@ -18,7 +18,7 @@ from creepkit.errors import CreepkitError
 from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import Perturbation
 from helpers.paths import ROOT
 
 FORMATS = ROOT / "tests" / "data" / "formats" / ck.__version__

@@ -153,7 +153,6 @@ class KnownLaw:
         """
         p, problem, e = self.size, self.measured, self.x[self.size :]
         residuals, nuisances = problem.residuals(self.fit.x), problem.nuisance_parameters
-        assert residuals.jacobian is not None
         own = [k for k in range(p, self.x.size) if k not in self.shared]
         of_own = residuals.jacobian[..., own]
         sd = np.minimum(nuisances.sd, (nuisances.high - nuisances.low) / np.sqrt(12.0))
@@ -211,9 +210,8 @@ class UsualErrors(NamedTuple):
         return cls(own, {e.kind: e.residual_change for e in errors if e.common and not of_ranking})
 
 
-def _with_columns(jacobian: Floats | None, columns: Iterable[Floats]) -> Floats:
+def _with_columns(jacobian: Floats, columns: Iterable[Floats]) -> Floats:
     """Derivatives (tests, observations, unknowns) and further columns (tests, observations)."""
-    assert jacobian is not None
     return np.concatenate([jacobian, *(column[..., None] for column in columns)], axis=-1)
 
 
@@ -464,7 +462,6 @@ def _predicted(
     )
     problem, x = with_derivatives_to_lengths(problem), np.append(law.fit.u, values_of_nuisances(nuisances, law))
     residuals, prediction = problem.residuals(x), problem.prediction(x)
-    assert residuals.jacobian is not None
     linear, among = problem.linearised(x, residuals), len(law.fit.histories) + 1
     errors = UsualErrors.of(problem, linear, noise_model, among, of_ranking=law.of_ranking)
     owners = list(zip((n.key for n in nuisances.nuisances), nuisances.owners, strict=True))

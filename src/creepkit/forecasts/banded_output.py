@@ -20,7 +20,7 @@ from scipy.stats import norm
 from creepkit.arrays import Bools, Floats
 from creepkit.forecasts.draws import DrawnLaw
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.noise_model import OutputNoise, components_fixed_by_priors
+from creepkit.inverse.noise_model import OutputNoise, known_sd
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, RELATIVE_DISCREPANCY_UNIT
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform
 from creepkit.records import History, is_logarithmic
@@ -264,7 +264,7 @@ class BandedOutput:
         """(count,) offsets of a test: where n tests told of their size they are Student's t of n."""
         if not self.is_fitted:
             return np.zeros(count)
-        if (self.name, "offset") in components_fixed_by_priors(self.fit.settings.nuisances, [self.name]):
+        if known_sd(self.fit.settings.nuisances, "offset", self.name):
             return np.asarray(self.known.offset * rng.standard_normal(count))
         return np.asarray(self.known.offset * rng.standard_t(len(self.fit.scatter_of_rates.tests), count))
 

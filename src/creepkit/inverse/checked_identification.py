@@ -58,8 +58,7 @@ def identify(
     """
     law, predictor = resolve_law(law), resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
-    histories, left_out = sound_tests(list(histories), settings)
-    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
+    histories, notes = _checked_tests(histories, predictor, settings)
     surrogate = _resolve_through(through, predictor)
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
@@ -69,8 +68,7 @@ def identify(
     else:
         fit = identify_sparse(law, histories, predictor, penalty=penalty, **how)
     fit = with_hold_tried(sampled_where_needed(fit, surrogate))
-    notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories))
-    return replace(fit, notes=(*fit.notes, *notes, *rig_notes(histories, settings)))
+    return replace(fit, notes=(*fit.notes, *notes))
 
 
 @takes_options(IdentificationSettings)
@@ -97,8 +95,7 @@ def select(
     predictor = resolve_predictors(using, histories)
     settings = (settings or IdentificationSettings()).changed(changes, predictor)
     settings.check_by_likelihood("select()")
-    histories, left_out = sound_tests(list(histories), settings)
-    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
+    histories, notes = _checked_tests(histories, predictor, settings)
     ranking = select_law(
         [resolve_law(law) for law in ((laws,) if isinstance(laws, str) else laws)],
         histories,
@@ -108,9 +105,18 @@ def select(
         sums=sums,
         progress=progress,
     )
-    notes = (*left_out, *length_notes(histories, predictor), *loading_notes(histories), *rig_notes(histories, settings))
     noted = (replace(one, fit=replace(one.fit, notes=(*one.fit.notes, *notes))) for one in ranking.laws)
     return replace(ranking, laws=tuple(noted))
+
+
+def _checked_tests(
+    histories: Sequence[History], predictor: Predictor | Mapping[str, Predictor], settings: IdentificationSettings
+) -> tuple[list[History], tuple[str, ...]]:
+    """The tests that count, and notes on them; FitError where a nuisance names another test."""
+    tests, left_out = sound_tests(list(histories), settings)
+    check_nuisance_tests(settings.nuisances, [h.name for h in tests])
+    notes = (*left_out, *length_notes(tests, predictor), *loading_notes(tests), *rig_notes(tests, settings))
+    return tests, notes
 
 
 def _resolve_through(through: Through, predictor: Predictor | Mapping[str, Predictor]) -> Predictor | None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Floats
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import scaled_inverse
 from creepkit.records import History, Prediction, Predictor, Status, output_unit
@@ -73,21 +73,22 @@ def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquare
     refined = problem.predictor.refined()
     if refined is None or problem.observations.followed_to_rupture.any():
         return problem, None
-    observations, count = problem.observations, problem.parameter_count
-    prediction = refined.predict(
-        problem.law,
-        problem.coordinates.theta(x[:count])[None],
-        problem.histories,
-        nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
-    )
+    observations, prediction = problem.observations, problem.predicted_by(refined, x)
     coarse = _predicted(problem, x)
     exact = observations.select_outputs(prediction.values, prediction)[0]
     complete = np.isin(prediction.status[0], (Status.COMPLETE, Status.OUTSIDE_DOMAIN))
     known = observations.present & complete[:, None] & np.isfinite(exact) & np.isfinite(coarse)
     correction = np.where(known, exact - coarse, 0.0)
     incomplete = tuple(h.name for h, whole in zip(problem.histories, complete, strict=True) if not whole)
-    error = _numerical_error(problem, refined, correction, known)
-    return problem.with_correction(correction), NumericalError(**error, incomplete=incomplete)  # type: ignore[arg-type]
+    sizes, noises = {}, 0.0
+    for position, name in enumerate(observations.outputs):
+        mask, noise = known & (observations.output_index == position), float(observations.noise[position])
+        if mask.any():
+            sizes[name] = float(np.sqrt(np.mean(correction[mask] ** 2)))
+            noises = max(noises, sizes[name] / noise) if noise > 0 else noises
+    label = f"{refined.label} on a finer mesh" if refined.label == problem.predictor.label else refined.label
+    error = NumericalError(problem.predictor.label, label, sizes, noises, float("nan"), incomplete)
+    return problem.with_correction(correction), error
 
 
 def with_cheaper_predictor(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> LeastSquaresProblem:
@@ -106,15 +107,11 @@ def with_correction_at_frames(
     if problem.correction is None:
         return prediction
     values = np.array(prediction.values)
-    for test, history in enumerate(histories):
-        for position, name in enumerate(problem.observations.outputs):
-            index = np.flatnonzero(
-                problem.observations.present[test] & (problem.observations.output_index[test] == position)
-            )
-            if index.size and name in prediction.outputs:
-                times = problem.observations.times[test, index]
-                correction = np.interp(history.times, times, problem.correction[test, index])
-                values[0, test, : history.times.size, prediction.outputs.index(name)] += correction
+    for test, position, index in problem.observations.series:
+        name, times = problem.observations.outputs[position], histories[test].times
+        if name in prediction.outputs:
+            correction = np.interp(times, problem.observations.times[test, index], problem.correction[test, index])
+            values[0, test, : times.size, prediction.outputs.index(name)] += correction
     return replace(prediction, values=values)
 
 
@@ -123,27 +120,6 @@ def _predicted(problem: LeastSquaresProblem, x: Floats) -> Floats:
     observations, problem = problem.observations, problem.about_rates(x, None)
     corrected = observations.inverse(problem.residuals(x).values + observations.transformed_values)
     return corrected if problem.correction is None else corrected - problem.correction
-
-
-def _numerical_error(
-    problem: LeastSquaresProblem, refined: Predictor, correction: Floats, known: Bools
-) -> dict[str, object]:
-    observations = problem.observations
-    sizes, noises = {}, 0.0
-    for position, name in enumerate(observations.outputs):
-        mask = known & (observations.output_index == position)
-        if not mask.any():
-            continue
-        sizes[name] = float(np.sqrt(np.mean(correction[mask] ** 2)))
-        noise = float(observations.noise[position])
-        noises = max(noises, sizes[name] / noise) if noise > 0 else noises
-    return {
-        "predictor": problem.predictor.label,
-        "refined": f"{refined.label} on a finer mesh" if refined.label == problem.predictor.label else refined.label,
-        "size": sizes,
-        "noises": noises,
-        "shift": float("nan"),
-    }
 
 
 def shift_of_values(problem: LeastSquaresProblem, x: Floats, change: Floats) -> float:

@@ -41,8 +41,6 @@ def evidence_weights(scores: ArrayLike) -> tuple[Floats, Floats]:
 def occam_penalty(linearised: LinearisedProblem, factor: CovarianceFactor) -> float:
     """ln det(1 + S J' C^-1 J S): what the unknowns of a law cost."""
     residuals = linearised.residuals
-    assert residuals.jacobian is not None
-    sd = 1.0 / np.sqrt(np.maximum(linearised.precision, 1e-300))
-    sd = np.minimum(sd, np.diff(linearised.step_bounds, axis=0)[0] / np.sqrt(12.0))
+    sd = np.minimum(linearised.prior_sd, np.diff(linearised.step_bounds, axis=0)[0] / np.sqrt(12.0))
     white = factor.whiten(residuals.jacobian * sd)[residuals.present]
     return float(np.linalg.slogdet(np.eye(sd.size) + white.T @ white)[1])

@@ -12,7 +12,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError, FitWarning
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import CreepLaw, temperature
-from creepkit.records import ZERO_CELSIUS
+from creepkit.records import ZERO_CELSIUS, PointLoading
 from creepkit.records.units import celsius_text
 
 if TYPE_CHECKING:
@@ -143,20 +143,25 @@ SAME_STRESS = 0.01
 
 
 def tested_points(fit: Identification) -> Floats:
-    """(points, 2) stress, MPa, and temperature, K, of the holds of the fitted tests; none without their histories."""
-    points = [
-        (float(stress), T)
-        for history, stresses in zip(fit.histories, fit.simulated_stresses, strict=True)
-        for stress in stresses
-        for T in _distinct(history.temperature_program().at(history.used_times))
-    ]
-    return np.array(points, float).reshape(-1, 2)
+    """(points, 2) stress, MPa, and temperature, K, that the fitted tests saw together; none without their histories.
 
-
-def _distinct(temperatures: Floats) -> list[float]:
-    """Temperatures (readings,) in K, one of those that are the same to 0.1 °C."""
-    first = np.unique(np.round(temperatures - ZERO_CELSIUS, 1), return_index=True)[1]
-    return [float(T) for T in temperatures[first]]
+    Of an imposed stress those of its readings: one that falls as the furnace is made hotter was never held at both
+    larger values. Where the specimen makes the stress, each that it goes through at each temperature of its test.
+    """
+    pairs = [np.zeros((0, 2))]
+    for history, stresses in zip(fit.histories, fit.simulated_stresses, strict=True):
+        times = history.used_times
+        temperatures = history.temperature_program().at(times)
+        if history.loading.quantity == "stress" and not isinstance(history.loading, PointLoading):
+            loads = history.loading.program().at(times)
+            held = loads >= (1.0 - SAME_STRESS) * stresses.min(initial=np.inf)  # not those of a ramp that loaded it
+            pairs.append(np.column_stack([loads, temperatures])[held])
+        else:
+            pairs.append(np.stack(np.meshgrid(stresses, np.unique(temperatures.round(1))), axis=-1).reshape(-1, 2))
+    points = np.concatenate(pairs)
+    points = points[points[:, 0] > 0]
+    same = np.round(np.column_stack([1e3 * np.log(points[:, 0]), 10.0 * points[:, 1]]))  # to 0.1 % and 0.1 K
+    return np.asarray(points[np.unique(same, axis=0, return_index=True)[1]])
 
 
 def stresses_at_temperatures(fit: Identification) -> list[tuple[float, tuple[float, float]]]:

@@ -167,11 +167,8 @@ def test_fits(
     test_fits = []
     for k, history in enumerate(histories):
         test_ratios = ratios[k][np.isfinite(ratios[k])]
-        rms, bias = (
-            (float(np.sqrt(np.mean(test_ratios**2))), float(np.mean(test_ratios)))
-            if test_ratios.size
-            else (np.nan, np.nan)
-        )
+        rms = float(np.sqrt(np.mean(test_ratios**2))) if test_ratios.size else np.nan
+        bias = float(np.mean(test_ratios)) if test_ratios.size else np.nan
         linear = int((observations.present[k] & ~logarithmic[k]).sum())
         offset_by_output = {name: float(v) for name, v in zip(observations.outputs, offsets[k], strict=True)}
         outputs = []
@@ -210,12 +207,8 @@ def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floa
     For tests followed to rupture, the orthogonal residual instead.
     """
     observations = problem.observations
-    floor = observations.per_observation(
-        [
-            s.floor if is_logarithmic(n) else np.inf
-            for n, s in zip(observations.outputs, observations.transforms, strict=True)
-        ]
-    )
+    named = zip(observations.outputs, observations.transforms, strict=True)
+    floor = observations.per_observation([one.floor if is_logarithmic(name) else np.inf for name, one in named])
     vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
     predicted = observations.inverse(vertical + problem.observations.transformed_values) + offset
     above_floor = observations.present & (observations.values > 2 * floor)

@@ -23,9 +23,8 @@ from creepkit.inverse.extrapolation import RANGE_TOLERANCE, UNSEEN_RUPTURE, warn
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import NuisanceEstimate, has_nuisance, owner_of, prior_mean
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, Perturbation, has_nuisance, owner_of, prior_mean
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint, simulated_stresses

@@ -21,9 +21,8 @@ from creepkit.inverse.explanation import Explanation, LeftOut
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, Perturbation
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
-from creepkit.inverse.perturbation import Perturbation
 from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.single_values import ContradictingValues, SingleValue

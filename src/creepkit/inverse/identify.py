@@ -46,9 +46,8 @@ from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
-from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
+from creepkit.inverse.nuisance_parameters import nuisance_estimates_of, unmodelled_note
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
-from creepkit.inverse.perturbation import unmodelled_note
 from creepkit.inverse.perturbations import (
     LIFE,
     RATE,
@@ -74,7 +73,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
 )
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.working_noise import UNRELATED_RATES, WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import UNRELATED_RATES, WorkingNoiseEstimator
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Status, is_length_nuisance
 
@@ -228,7 +227,7 @@ def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
     found, estimator = end.best, _working_estimator(end.best.problem, end.numerical_error)
     problem, linear = found.problem, found.linear
     noise = estimator.final(linear, found.noise, problem.parameter_count)
-    working_noise = None if estimator.by_likelihood else with_single_value_weight(found.noise, problem.observations)
+    working_noise = None if estimator.by_likelihood else estimator.weighting(found.noise)
     errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
     by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     u, covariance = np.split(found.x, [problem.parameter_count])[0], by_tests + of_errors
@@ -239,10 +238,9 @@ def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
 
 def _check_bounds(found: EstimationResult) -> None:
     """FitError where the bounds of the law exclude the data."""
-    residuals, jacobian = found.linear.residuals, found.linear.residuals.jacobian
-    assert jacobian is not None
-    factor, count = CovarianceFactor.of_residuals(residuals, found.noise), found.problem.parameter_count
-    gradient = np.einsum("te,tep->p", factor.inverse_times(residuals.values), jacobian)
+    residuals, count = found.linear.residuals, found.problem.parameter_count
+    weighted = CovarianceFactor.of_residuals(residuals, found.noise).inverse_times(residuals.values)
+    gradient = np.einsum("te,tep->p", weighted, residuals.jacobian)
     check_bounds(found.problem.bound_penalties, found.x[:count], gradient[:count], found.problem.observations.count)
 
 
@@ -379,7 +377,7 @@ def _reported(
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
         errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
-        working_noise = with_single_value_weight(best.noise, problem.observations)
+        working_noise = estimator.weighting(best.noise)
     expected = with_expected_scatter(problem, linear, noise_model)
     unmodelled = perturbations(
         problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
@@ -388,12 +386,7 @@ def _reported(
     rates = RateExplanations(problem, x, judged, noise_model)
     covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
-    prediction = problem.predictor.predict(
-        law,
-        coordinates.theta(u)[None],
-        list(histories),
-        nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
-    )
+    prediction = problem.predicted_by(problem.predictor, x, histories)
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)

@@ -18,13 +18,12 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import NuisanceParameters, Perturbation
 from creepkit.inverse.perturbations import errors_of_tests, with_derivatives_to_lengths, with_expected_scatter
 from creepkit.inverse.problem import LARGEST_FACTOR, NOTEWORTHY_FACTOR, LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood, scaled_inverse
-from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
@@ -118,8 +117,8 @@ def estimate_iteratively(
         problem = problem.about_stopped_tests(x, noise)
         residuals = problem.residuals(x)
         linear = problem.linearised(x, residuals)
-        noise = estimator.estimate(residuals, noise, linear)
-        factor = _covariance_factor(problem, residuals, noise, estimator)
+        noise = estimator.estimate(linear, noise)
+        factor = CovarianceFactor.of_residuals(residuals, estimator.weighting(noise))
         problem = problem.with_covariance(factor)
         if by_likelihood and (is_near or best is not None):
             # the covariance moves with the values: near the end each step is taken under its own
@@ -186,23 +185,15 @@ def _stepped(
     target[free] += solution.step
     x = problem.constrained(linear.x, target, free, solution.covariance)
     size = float((np.abs(x - linear.x)[free] / np.sqrt(np.diag(solution.covariance))).max(initial=0.0))
-    assert residuals.jacobian is not None
     for _ in range(MOST_HALVINGS if size > least else 0):
         expected = replace(residuals, values=residuals.values + residuals.jacobian @ (x - linear.x))
         moved = _about_predicted_rates(problem, x, expected, noise)
         there = moved.residuals(x)
         further = replace(moved.linearised(x, there), free=free)
-        if is_finite(there) and _chi_square(further, factor) < _chi_square(linear, factor):
+        if is_finite(there) and further.chi_square(factor)[0] < linear.chi_square(factor)[0]:
             return moved, further, size
         x = 0.5 * (x + linear.x)
     return problem, linear, size
-
-
-def _chi_square(linear: LinearisedProblem, factor: CovarianceFactor) -> float:
-    """Of residuals and priors, at the values of a linear problem."""
-    return float(
-        (factor.whiten(linear.residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
-    )
 
 
 def within_bounds(found: EstimationResult) -> EstimationResult:
@@ -216,8 +207,7 @@ def within_bounds(found: EstimationResult) -> EstimationResult:
 
 def is_finite(residuals: Residuals) -> bool:
     """Whether residuals and their derivatives are numbers."""
-    jacobian = residuals.jacobian
-    return jacobian is not None and bool(np.isfinite(residuals.values).all() and np.isfinite(jacobian).all())
+    return bool(np.isfinite(residuals.values).all() and np.isfinite(residuals.jacobian).all())
 
 
 def judged_at(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> LinearisedProblem:
@@ -251,14 +241,6 @@ def _about_predicted_rates(
     return problem.about_rates(x, log_factors) if np.abs(log_factors - known).max() >= NOTEWORTHY_FACTOR else problem
 
 
-def _covariance_factor(
-    problem: LeastSquaresProblem, residuals: Residuals, noise: NoiseModel, estimator: WorkingNoiseEstimator
-) -> CovarianceFactor:
-    """The covariance under which the values of a round are found."""
-    fitting_noise = noise if estimator.by_likelihood else with_single_value_weight(noise, problem.observations)
-    return CovarianceFactor.of_residuals(residuals, fitting_noise)
-
-
 def _log_likelihood(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> float:
     # The optimum under weights is none of the noise model: that it is flat in the law's parameters says nothing for it.
     by_likelihood = problem.settings.weights == "likelihood"
@@ -273,7 +255,6 @@ def _with_priors_found(
     nuisances = problem.nuisance_parameters
     if all(n.sd is not None for n in nuisances.nuisances):
         return problem
-    assert residuals.jacobian is not None
     whitened = CovarianceFactor.of_residuals(residuals, noise).whiten(residuals.jacobian)
     return problem.with_nuisances(_with_prior_sd(nuisances, np.einsum("tfp,tfq->pq", whitened, whitened), x))
 

@@ -31,8 +31,8 @@ from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.nuisance_parameters import DRIFT, Perturbation
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
-from creepkit.inverse.perturbation import DRIFT, Perturbation
 from creepkit.inverse.perturbations import effect_of_lives, sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
@@ -199,10 +199,9 @@ class Judge:
         observations, histories = self.problem.observations, self.histories
         known, deviation = judged.known, judged.deviation
         series = [
-            (test, name, index)
-            for test in range(len(histories))
-            for position, name in enumerate(observations.outputs)
-            if (index := np.flatnonzero(known.judged[test] & (observations.output_index[test] == position))).size
+            (test, observations.outputs[position], judged_index)
+            for test, position, index in observations.series
+            if (judged_index := index[known.judged[test, index]]).size
         ]
         if not series:
             return None

@@ -51,18 +51,17 @@ class KnownNoise:
         sd = observations.per_observation(observations.noise) * observations.relative_noise
         freedom = np.full(sd.shape, np.inf)
         few: dict[str, int] = {}
-        for test, history in enumerate(histories):
-            for position, name in enumerate(observations.outputs):
-                mask = observations.present[test] & (observations.output_index[test] == position)
-                if name in SINGLE_VALUES or observations.stated[position] or not mask.any():
-                    continue
-                frames = int(usable_frames(history, name).sum())
-                floor = SMALLEST_NOISE * observations.transforms[position].floor
-                estimated = _estimated_noise(history, name, observations.values[test, mask])
-                sd[test, mask] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
-                freedom[test, mask] = FREEDOM_PER_FRAME * frames
-                if FREEDOM_PER_FRAME * frames < LEAST_NOISE_FREEDOM:
-                    few[history.name] = min(frames, few.get(history.name, frames))
+        for test, position, index in observations.series:
+            history, name = histories[test], observations.outputs[position]
+            if name in SINGLE_VALUES or observations.stated[position]:
+                continue
+            frames = int(usable_frames(history, name).sum())
+            floor = SMALLEST_NOISE * observations.transforms[position].floor
+            estimated = _estimated_noise(history, name, observations.values[test, index])
+            sd[test, index] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
+            freedom[test, index] = FREEDOM_PER_FRAME * frames
+            if FREEDOM_PER_FRAME * frames < LEAST_NOISE_FREEDOM:
+                few[history.name] = min(frames, few.get(history.name, frames))
         ruptures = observations.rupture_mask
         judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
         return cls(judged, np.where(judged, sd, 1.0), freedom, tuple(few.items()))

@@ -17,7 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries, SharedNoise
-from creepkit.inverse.observation_vector import SINGLE_VALUES, ObservationVector
+from creepkit.inverse.observation_vector import SINGLE_VALUES
 from creepkit.records import Nuisance
 
 
@@ -49,7 +49,7 @@ class Residuals:
     offset_sensitivity : (tests, observations) 1 / unit, effect of one unit of offset.
     present : (tests, observations) which are data; the others are zero.
     correlation_coordinate : (tests, observations) -, in which drifts decay: ln t or a share of the duration.
-    jacobian : (tests, observations, unknowns) derivatives to x = (u, e), or None.
+    jacobian : (tests, observations, unknowns) derivatives to x = (u, e).
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
         the typical noise of that output.
@@ -67,7 +67,7 @@ class Residuals:
     offset_sensitivity: Floats
     present: Bools
     correlation_coordinate: Floats
-    jacobian: Floats | None
+    jacobian: Floats
     log_rate_sensitivity: Floats
     output_index: Ints
     relative_noise: Floats
@@ -221,15 +221,6 @@ class NoiseModel:
         return replace(self, outputs={name: replace(one, offset=0.0) for name, one in self.outputs.items()})
 
 
-def initial_working_noise(observations: ObservationVector, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """Working noise before anything was fitted: a misfit of 0.3, offsets of the floor of the transform."""
-    by_output = {}
-    for name, transform, noise in zip(observations.outputs, observations.transforms, observations.noise, strict=True):
-        offset = initial_sd(nuisances, "offset", transform.floor, name)
-        by_output[name] = OutputNoise(noise=max(float(noise), 1e-3 * transform.floor), misfit=0.3, offset=offset)
-    return NoiseModel(by_output)
-
-
 def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
     """The same; where each test has one value alone, all its scatter is that of the rates between tests, if any."""
     (name, *others) = noise_model.outputs
@@ -237,22 +228,9 @@ def without_confounded_misfit(noise_model: NoiseModel) -> NoiseModel:
     return noise_model.with_output(name, misfit=0.0) if confounded else noise_model
 
 
-def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output: str = "") -> float:
-    """Initial standard deviation of a nuisance: its prior, by default `default`; 0 where there is no such nuisance."""
-    standard_deviations = [
-        default if n.sd is None else n.sd for n in nuisances if n.kind == kind and n.output in ("", output)
-    ]
-    return standard_deviations[0] if standard_deviations else 0.0
-
-
-def components_fixed_by_priors(nuisances: Sequence[Nuisance], outputs: Sequence[str]) -> set[tuple[str, str]]:
-    """Those (output, component) that a nuisance states; the rate belongs to the output ""."""
-    fixed: set[tuple[str, str]] = {("", "rate") for n in nuisances if n.kind == "rate" and n.sd is not None}
-    for output in outputs:
-        offset_nuisances = [n for n in nuisances if n.kind == "offset" and n.output in ("", output)]
-        if offset_nuisances and offset_nuisances[0].sd is not None:
-            fixed.add((output, "offset"))
-    return fixed
+def known_sd(nuisances: Sequence[Nuisance], kind: str, output: str = "") -> float | None:
+    """The standard deviation that is stated of a nuisance; 0 where there is no such one, None where it is estimated."""
+    return next((n.sd for n in nuisances if n.kind == kind and n.output in ("", output)), 0.0)
 
 
 NEGLIGIBLE_DRIFT = 1e-3

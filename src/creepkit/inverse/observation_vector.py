@@ -309,6 +309,15 @@ class ObservationVector:
         """(tests, observations) numbers of the output of each observation, from values (outputs,)."""
         return np.asarray(values, float)[self.output_index]
 
+    @cached_property
+    def series(self) -> tuple[tuple[int, int, Ints], ...]:
+        """(test, position of an output, (observations,) their indices) of each test and each output that it has."""
+        return tuple(
+            (test, int(position), np.flatnonzero(present & (index == position)))
+            for test, (present, index) in enumerate(zip(self.present, self.output_index, strict=True))
+            for position in np.unique(index[present])
+        )
+
     @property
     def rupture_mask(self) -> Bools:
         """(tests, observations) which are rupture times, or times without rupture."""

@@ -36,9 +36,8 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, prior_mean
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.settings import USUAL_ERRORS
@@ -232,12 +231,10 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
     observations, residuals = problem.observations, linear.residuals
     predicted = observations.inverse(residuals.values + observations.transformed_values)
     change, by_time = np.zeros_like(predicted), problem.law.uses(time)
-    for test, history in enumerate(problem.histories):
-        for position in np.unique(observations.output_index[test, observations.present[test]]):
-            index = np.flatnonzero(observations.present[test] & (observations.output_index[test] == position))
-            if index.size >= 3 and not observations.rupture_mask[test, index].any():
-                times = observations.times[test, index]
-                change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
+    for test, _, index in observations.series:
+        if index.size >= 3 and not observations.rupture_mask[test, index].any():
+            history, times = problem.histories[test], observations.times[test, index]
+            change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
     reference = problem.coordinates.reference
     factor = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature) * USUAL_DRIFT
     change = factor * change * residuals.offset_sensitivity
@@ -275,22 +272,19 @@ def _slope(problem: LeastSquaresProblem, x: Floats, kind: str, at: Floats | None
     if kind in problem.lengths:
         prediction = problem.prediction(x)
     else:
-        theta, nuisances = _values(problem, x)
-        values = nuisances.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
-        prediction = problem.predictor.predict(
-            problem.law, theta[None], problem.histories, nuisances={**nuisances, kind: values}, sensitivities=True
-        )
+        known = problem.nuisance_parameters.predictor_values(x[problem.parameter_count :])
+        values = known.get(kind, np.zeros((1, len(problem.histories)))) if at is None else at[None]
+        prediction = problem.predicted_by(problem.predictor, x, given={kind: values})
     slope = problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0]
     return np.where(np.isfinite(slope), slope, 0.0)
 
 
 def _motion_slope(problem: LeastSquaresProblem, x: Floats) -> Floats:
     """(tests, observations) derivative of the outputs to the relative change of what is imposed."""
-    theta, nuisances = _values(problem, x)
 
     def outputs(change: float) -> Floats:
         histories = [_moved(history, change) for history in problem.histories]
-        prediction = problem.predictor.predict(problem.law, theta[None], histories, nuisances=nuisances)
+        prediction = problem.predicted_by(problem.predictor, x, histories)
         return np.asarray(problem.observations.select_outputs(prediction.values, prediction)[0])
 
     with np.errstate(invalid="ignore"):  # of tests that end before
@@ -305,12 +299,6 @@ def _moved(history: History, change: float) -> History:
     program = history.loading.program()
     loading = RecordedLoading(Program(program.times, program.values * (1.0 + change)), history.loading.quantity)
     return replace(history, loading=loading)
-
-
-def _values(problem: LeastSquaresProblem, x: Floats) -> tuple[Floats, dict[str, Floats]]:
-    """(parameters,) internal values and the explicit nuisances."""
-    count = problem.parameter_count
-    return problem.coordinates.theta(x[:count]), dict(problem.nuisance_parameters.predictor_values(x[count:]))
 
 
 def log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats, stress: ArrayLike, T: ArrayLike) -> Floats:

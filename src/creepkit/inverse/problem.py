@@ -172,10 +172,8 @@ class LeastSquaresProblem:
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
-        noise = WorkingNoiseEstimator(settings, observations, predictor.error).initial()
-        covariance_factor = CovarianceFactor.of_residuals(
-            residuals_at_measured_values(observations), with_single_value_weight(noise, observations)
-        )
+        noise = with_single_value_weight(WorkingNoiseEstimator(settings, observations).initial(), observations)
+        covariance_factor = CovarianceFactor.of_residuals(residuals_at_measured_values(observations), noise)
         conditions = np.array([reference_condition(test, predictor) for test in tests]).T
         posed = (coordinates, observations, nuisances, bounds, settings, covariance_factor, conditions)
         return cls(tuple(tests), predictor, *posed)
@@ -291,8 +289,7 @@ class LeastSquaresProblem:
         if self.observations.followed_to_rupture.any():
             single = self.with_fixed_nuisances()
             evaluated = [single.residuals(one) for one in u]
-            jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
-            return np.stack([r.values for r in evaluated]), np.stack(jacobians)
+            return np.stack([r.values for r in evaluated]), np.stack([r.jacobian for r in evaluated])
         prediction = self._counted(u, jacobian=True)
         values, internal_jacobian = candidate_residuals(self.observations, prediction, self.correction)
         assert internal_jacobian is not None
@@ -352,6 +349,22 @@ class LeastSquaresProblem:
 
         return self.evaluations.prediction(self._key(x), self.lengths, evaluated)
 
+    def predicted_by(
+        self,
+        predictor: Predictor,
+        x: Floats,
+        histories: Sequence[History] | None = None,
+        given: NuisanceValues | None = None,
+    ) -> Prediction:
+        """What a predictor says of histories, by default those of the problem, at one x (unknowns,).
+
+        given : {key: (1, tests)} nuisances beside or in place of those of the problem; with derivatives to all.
+        """
+        u, e = np.split(x, [self.parameter_count])
+        nuisances = {**self.nuisance_parameters.predictor_values(e), **(given or {})}
+        tests = (self.law, self.coordinates.theta(u)[None], histories or self.histories)
+        return predictor.predict(*tests, nuisances=nuisances, sensitivities=given is not None)
+
     def _key(self, x: Floats) -> bytes:
         """What a prediction at x (unknowns,) depends on."""
         held = [self.nuisance_parameters.mean if self.nuisance_parameters.fixed else None, self.log_factors]
@@ -367,7 +380,6 @@ class LeastSquaresProblem:
             coordinates.coefficients if coordinates.every_rate_has_coefficient else None,
             self.correction,
         )
-        assert residuals.jacobian is not None
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)
         jacobian = np.concatenate([internal @ coordinates.jacobian(u), nuisance_jacobian], axis=-1)
         return replace(residuals, jacobian=jacobian, rate_errors=self._stated_errors(u))
@@ -397,7 +409,6 @@ class LeastSquaresProblem:
     def system(self, x: Floats) -> tuple[Floats, Floats]:
         """(data + priors,) - whitened residuals at x (unknowns,) of data and nuisance parameters, with derivatives."""
         residuals, nuisances, count = self.residuals(x), self.nuisance_parameters, self.parameter_count
-        assert residuals.jacobian is not None
         data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
         root, e = np.sqrt(nuisances.precision), x[count:]
         priors = np.column_stack([root * (e - nuisances.mean[: e.size]), np.zeros((e.size, count)), np.diag(root)])

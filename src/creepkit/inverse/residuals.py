@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Floats
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, ObservationVector
@@ -68,16 +68,9 @@ def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_sl
 
 def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
     """Residuals of zero with the derivatives at the measured values: a covariance exists before any prediction."""
-    observed = observations.values
-    derivatives = np.where(observations.present, observations.derivative(observed), 0.0)
-    return _masked_residuals(
-        observations,
-        np.zeros_like(derivatives),
-        derivatives,
-        None,
-        derivatives * np.maximum(observed, 0.0),
-        observations.present,
-    )
+    derivatives = np.where(observations.present, observations.derivative(observations.values), 0.0)
+    zero, rates = np.zeros_like(derivatives), derivatives * np.maximum(observations.values, 0.0)
+    return _masked_residuals(observations, zero, derivatives, np.zeros((*zero.shape, 0)), rates)
 
 
 def candidate_residuals(
@@ -130,8 +123,7 @@ def residuals_of_prediction(
         log_rate_sensitivity = by_strain * _time_derivative(observations, predicted[0]) + by_time
     else:
         log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
-    mask = observations.present
-    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity, mask)
+    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity)
 
 
 def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
@@ -290,28 +282,21 @@ def _time_derivative(observations: ObservationVector, predicted: Floats) -> Floa
     """
     transformed = observations.forward(np.where(np.isfinite(predicted), predicted, observations.values))
     sensitivity = np.zeros_like(transformed)
-    for k, present in enumerate(observations.present):
-        for position in np.unique(observations.output_index[k, present]):
-            row = present & (observations.output_index[k] == position)
-            if observations.outputs[position] == MINIMUM_RATE_OUTPUT:
-                sensitivity[k, row] = 1.0
-            elif row.sum() > 1:
-                sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
+    for k, position, row in observations.series:
+        if observations.outputs[position] == MINIMUM_RATE_OUTPUT:
+            sensitivity[k, row] = 1.0
+        elif row.size > 1:
+            sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
     return sensitivity
 
 
 def _masked_residuals(
-    observations: ObservationVector,
-    values: Floats,
-    derivatives: Floats,
-    jacobian: Floats | None,
-    log_rate_sensitivity: Floats,
-    mask: Bools,
+    observations: ObservationVector, values: Floats, derivatives: Floats, jacobian: Floats, log_rate_sensitivity: Floats
 ) -> Residuals:
     residuals = Residuals(
         values=values,
         offset_sensitivity=derivatives,
-        present=mask,
+        present=observations.present,
         correlation_coordinate=observations.correlation_coordinate,
         jacobian=jacobian,
         log_rate_sensitivity=log_rate_sensitivity,
@@ -320,4 +305,4 @@ def _masked_residuals(
         discrepancy_unit=observations.discrepancy_unit,
         shared_noise=observations.shared_noise,
     )
-    return residuals.where(mask)
+    return residuals.where(observations.present)

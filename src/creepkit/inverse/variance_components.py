@@ -10,8 +10,8 @@ from scipy.optimize import OptimizeResult, lsq_linear, minimize
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
-from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, components_fixed_by_priors
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, known_sd
+from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
@@ -37,13 +37,11 @@ class LinearisedProblem:
     @property
     def jacobian(self) -> Floats:
         """(tests, observations, free unknowns) derivatives of the residuals."""
-        assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
     def of(self, unknowns: Sequence[int]) -> LinearisedProblem:
         """The same of some of the unknowns, the others held."""
         residuals, kept = self.residuals, [*unknowns]
-        assert residuals.jacobian is not None
         return LinearisedProblem(
             replace(residuals, jacobian=residuals.jacobian[..., kept]),
             self.precision[kept],
@@ -78,6 +76,23 @@ class LinearisedProblem:
         chi2 = float((residuals * weighted_residuals).sum() + (self.precision * prior_residual**2).sum())
         log_det = -float(np.linalg.slogdet(covariance)[1])
         return LinearSolution(step, residuals, weighted_residuals, weighted[..., 1:], covariance, chi2, log_det)
+
+    @property
+    def prior_sd(self) -> Floats:
+        """(unknowns,) standard deviations of the priors."""
+        return np.asarray(1.0 / np.sqrt(np.maximum(self.precision, 1e-300)))
+
+    @property
+    def whole(self) -> LinearisedProblem:
+        """The same with all unknowns free."""
+        return replace(self, free=np.ones_like(self.free))
+
+    def chi_square(self, factor: CovarianceFactor, step: Floats | float = 0.0) -> tuple[float, Floats]:
+        """Of residuals and priors after a step (unknowns,), and the whitened residuals (tests, observations)."""
+        residuals = self.residuals
+        whitened = factor.whiten(residuals.values + residuals.jacobian @ np.broadcast_to(step, self.precision.shape))
+        prior = self.precision * (self.prior_residual + step) ** 2
+        return float((whitened**2).sum() + prior.sum()), whitened
 
     def step_within(self, factor: CovarianceFactor) -> Floats:
         """(free unknowns,) the step to the optimum within the bounds, or none where it gains nothing."""
@@ -191,6 +206,15 @@ OVERSHOOT = float(np.log(30.0))
 search is repeated from half way."""
 
 
+BOUNDS = {
+    "rate": (SMALLEST_RATE_SCATTER, LARGEST_RATE_SCATTER),
+    "discrepancy": (1e-2, LARGEST_DISCREPANCY),
+    "discrepancy_length": (SHORTEST_DISCREPANCY, LONGEST_CORRELATION),
+    "correlation_length": (SHORTEST_CORRELATION, LONGEST_DRIFT),
+}
+"""Of components that have the same ones whatever the data."""
+
+
 def estimate_variance_components(
     residuals: Residuals,
     start: NoiseModel,
@@ -206,27 +230,21 @@ def estimate_variance_components(
     linearised : with it the likelihood is the restricted one, parameters of the law integrated out.
     longest_drift : longest correlation of the drifts, in correlation time.
     """
-    fixed_by_prior = components_fixed_by_priors(nuisances, list(start.outputs))
     free = [
         (o, n)
         for n in OUTPUT_COMPONENTS
         for o, components in start.outputs.items()
         if getattr(components, n) > 0
-        and (o, n) not in fixed_by_prior
+        and not (n == "offset" and known_sd(nuisances, n, o))
         and n not in fixed
         and (n != "correlation_length" or components.drift > 0)
     ]
-    free += [("", "rate")] if start.rate > 0 and ("", "rate") not in fixed_by_prior else []
+    free += [("", "rate")] if start.rate > 0 and not known_sd(nuisances, "rate") else []
     free += [("", "discrepancy"), ("", "discrepancy_length")] if start.discrepancy > 0 else []
     if not free:
         return start
     likelihood = _Likelihood(residuals, start, free, linearised)
-    bounds = [
-        (float(np.log(SHORTEST_CORRELATION)), float(np.log(longest_drift)))
-        if name == "correlation_length"
-        else _bounds(residuals, start, output, name)
-        for output, name in free
-    ]
+    bounds = [_bounds(residuals, start, output, name, longest_drift) for output, name in free]
     x0 = np.clip(np.log(likelihood.components[likelihood.positions]), *np.transpose(bounds))
     optimum = _minimised(likelihood, x0, bounds)
     overshot = optimum.x < x0 - OVERSHOOT
@@ -288,20 +306,19 @@ class _Likelihood:
         )
 
 
-def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
+def _bounds(
+    residuals: Residuals, noise_model: NoiseModel, output: str, name: str, longest_drift: float
+) -> tuple[float, float]:
     """Bounds of the logarithm of a component: an offset up to the typical output itself."""
-    if name == "rate":
-        return float(np.log(SMALLEST_RATE_SCATTER)), float(np.log(LARGEST_RATE_SCATTER))
-    if name == "discrepancy_length":
-        return float(np.log(SHORTEST_DISCREPANCY)), float(np.log(LONGEST_CORRELATION))
-    if name == "discrepancy":
-        return float(np.log(1e-2)), float(np.log(LARGEST_DISCREPANCY))
-    if name == "noise":
+    low, high = BOUNDS.get(name, (1e-4, 5.0))
+    if name == "correlation_length":
+        high = longest_drift
+    elif name == "noise":
         measured, stated = noise_model[output].noise, noise_model[output].stated
-        lowest = stated if stated > 0 else SMALLEST_NOISE_RATIO * measured
-        return float(np.log(lowest)), float(np.log(LARGEST_NOISE_RATIO * max(measured, lowest)))
-    if name != "offset":
-        return float(np.log(1e-4)), float(np.log(5.0))
-    mask = residuals.present & (residuals.output_index == list(noise_model.outputs).index(output))
-    typical_output = float(np.median(1.0 / np.maximum(residuals.offset_sensitivity[mask], 1e-12)))
-    return float(np.log(1e-5 * typical_output)), float(np.log(typical_output))
+        low = stated if stated > 0 else SMALLEST_NOISE_RATIO * measured
+        high = LARGEST_NOISE_RATIO * max(measured, low)
+    elif name == "offset":
+        mask = residuals.present & (residuals.output_index == list(noise_model.outputs).index(output))
+        high = float(np.median(1.0 / np.maximum(residuals.offset_sensitivity[mask], 1e-12)))
+        low = 1e-5 * high
+    return float(np.log(low)), float(np.log(high))

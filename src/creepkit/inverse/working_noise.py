@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +15,11 @@ from creepkit.inverse.noise_model import (
     OutputNoise,
     Residuals,
     autocorrelated_components,
-    initial_sd,
-    initial_working_noise,
+    known_sd,
     without_confounded_misfit,
 )
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
-from creepkit.inverse.output_transforms import LinearTransform
+from creepkit.inverse.output_transforms import LinearTransform, OutputTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import (
     LARGEST_RATE_SCATTER,
@@ -57,6 +56,10 @@ INITIAL_DISCREPANCY = 1.0
 """In noises, where the estimate of a discrepancy begins."""
 
 
+INITIAL_MISFIT = 0.3
+"""Of transformed outputs, before anything was fitted."""
+
+
 INITIAL_SINGLE_VALUE_SD = 0.3
 """Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
@@ -79,17 +82,18 @@ class WorkingNoiseEstimator:
         self.by_likelihood = settings.weights == "likelihood"
 
     def initial(self) -> NoiseModel:
-        """The working noise before anything was fitted."""
-        return initial_working_noise(self.observations, self.settings.nuisances)
+        """The working noise before anything was fitted: a misfit of 0.3, offsets of the floor of the transform."""
+        return NoiseModel(self._outputs(1e-3, lambda _: INITIAL_MISFIT))
 
-    def estimate(
-        self, residuals: Residuals, previous: NoiseModel, linearised: LinearisedProblem | None = None
-    ) -> NoiseModel:
-        """The working noise, given residuals; for a likelihood also the problem made linear."""
+    def estimate(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
+        """The working noise, given the problem made linear."""
         if self.by_likelihood:
-            assert linearised is not None
             return self._by_restricted_likelihood(linearised, previous)
-        return estimate_variance_components(residuals, previous, self.settings.nuisances)
+        return estimate_variance_components(linearised.residuals, previous, self.settings.nuisances)
+
+    def weighting(self, working_noise: NoiseModel) -> NoiseModel:
+        """The noise under which values are found."""
+        return working_noise if self.by_likelihood else with_single_value_weight(working_noise, self.observations)
 
     def starting_noise(self, tests: int) -> NoiseModel:
         """Where the iteration begins: the guess, or for a likelihood all sources of scatter at a tenth."""
@@ -111,23 +115,32 @@ class WorkingNoiseEstimator:
         return self._by_restricted_likelihood(replace(linearised, free=linearised.free & ~held), start)
 
     def _likely_start(self, tests: int) -> NoiseModel:
-        nuisances, by_output = self.settings.nuisances, {}
-        for name, scale, noise in zip(
-            self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True
-        ):
-            offset = initial_sd(nuisances, "offset", scale.floor, name)
-            misfit = INITIAL_SINGLE_VALUE_SD if name in SINGLE_VALUES else 0.03 if is_logarithmic(name) else 0.0
-            by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset)
+        def misfit(name: str) -> float:
+            return INITIAL_SINGLE_VALUE_SD if name in SINGLE_VALUES else 0.03 if is_logarithmic(name) else 0.0
+
         units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
         units = units[units > 0]
         discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if units.size else 0.0
-        return without_confounded_misfit(NoiseModel(by_output, self._likely_rate(tests), discrepancy))
+        outputs = self._outputs(SMALLEST_NOISE, misfit)
+        return without_confounded_misfit(NoiseModel(outputs, self._likely_rate(tests), discrepancy))
+
+    def _outputs(self, least: float, misfit: Callable[[str], float]) -> dict[str, OutputNoise]:
+        """The noise of each output, at least a share of the floor of its transform, a misfit, and offsets of tests."""
+        known = zip(self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True)
+        return {
+            name: OutputNoise(max(float(noise), least * transform.floor), misfit(name), self._offset(name, transform))
+            for name, transform, noise in known
+        }
+
+    def _offset(self, output: str, transform: OutputTransform) -> float:
+        """Where an estimate of the offsets of tests begins."""
+        known = known_sd(self.settings.nuisances, "offset", output)
+        return transform.floor if known is None else known
 
     def _likely_rate(self, tests: int) -> float:
         """Where an estimate of the scatter of rates between so many tests begins."""
-        nuisances = [n for n in self.settings.nuisances if n.kind == "rate"]
-        known = [n for n in nuisances if n.sd is not None or tests >= MINIMUM_TESTS]
-        return initial_sd(known, "rate", ASSUMED_RATE_SD)
+        known = known_sd(self.settings.nuisances, "rate")
+        return ASSUMED_RATE_SD * (tests >= MINIMUM_TESTS) if known is None else known
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
         """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.
@@ -191,7 +204,7 @@ class WorkingNoiseEstimator:
         No component begins smaller than in a first estimate: the likelihood hardly depends on one that has vanished, as
         far from the optimum, and it would never come back.
         """
-        observations, nuisances = self.observations, self.settings.nuisances
+        observations = self.observations
         for name, noise, stated, scale in zip(
             observations.outputs, observations.noise, observations.stated, observations.transforms, strict=True
         ):
@@ -200,7 +213,7 @@ class WorkingNoiseEstimator:
             noise_model = noise_model.with_output(
                 name,
                 noise=initial_noise,
-                offset=max(noise_model[name].offset, initial_sd(nuisances, "offset", scale.floor, name)),
+                offset=max(noise_model[name].offset, self._offset(name, scale)),
                 drift=initial_drift,
                 correlation_length=INITIAL_DRIFT_LENGTH,
                 stated=initial_noise if stated else 0.0,

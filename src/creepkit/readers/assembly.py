@@ -27,6 +27,7 @@ from creepkit.readers.derived_records import (
     from_loading_on,
     length_said,
     modulus_of_ramp,
+    up_to_rupture,
     with_changes_of_lengths,
     without_loading,
     without_steps,
@@ -97,7 +98,7 @@ def assemble_history(
     take_height(conditions, name)
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
-    frames = from_loading_on(conditions, frames)
+    frames = up_to_rupture(conditions, from_loading_on(conditions, frames), name)
     for assumption in frames.table.assumptions[len(table.assumptions) :]:
         conditions.record_assumption(assumption)
     if count := len(frames.marked):

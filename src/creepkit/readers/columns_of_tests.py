@@ -186,15 +186,13 @@ def _quantity_by_words(name: str, unit: str) -> str:
     plain = plain_words(name)
     if _RATE_SYMBOL.fullmatch(unicodedata.normalize("NFD", name)) and unit in RATE.units:
         return "minimum_rate"
-    if RATES.fullmatch(plain) and unit in RATE.units:  # in a table of creep tests
-        return "minimum_rate"
     is_time = unit in TIME.units or (unit == "" and _IS_TIME.search(plain))
     is_rate = bool(RATES.search(plain)) and not re.search(r"sd\b|std|err", plain) and unit in (*RATE.units, "", "pct")
     is_min = _OF_MINIMUM.search(plain)
     is_of_no_test = (is_rate or is_time) and _OF_NO_TEST.search(_OF_MINIMUM.sub("", plain) if is_rate else plain)
     if is_of_no_test or (is_rate and not is_min and _ANOTHER_RATE.search(plain)):
         return LABEL
-    if is_rate and (is_min or is_bare_rate(name)):
+    if is_rate and (is_min or is_bare_rate(name) or (RATES.fullmatch(plain) and unit in RATE.units)):
         return "minimum_rate"
     is_rupture = _OF_RUPTURE.search(plain) and _IS_TIME.search(plain) and not _OF_OTHERS.search(plain)
     return "rupture" if is_rupture else ""
@@ -204,12 +202,6 @@ def is_bare_rate(name: str) -> bool:
     """Whether a name is that of a creep rate of which it does not say that it is the smallest."""
     plain = plain_words(name)
     return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech", plain) is not None
-
-
-def is_any_rate(written: str) -> bool:
-    """Whether a column holds rates of creep or of something else, in a unit of theirs."""
-    name, unit = split_written_name(written)
-    return bool(RATES.search(plain_words(name))) and unit_suffix(unit) in RATE.units
 
 
 def _strain_reached(written: str) -> float | None:
@@ -377,7 +369,8 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     found = {one.quantity for one in columns}
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
-    measured |= any(map(is_any_rate, names)) and "end_time" not in found
+    rates = [split_written_name(name)[1] for name in names if RATES.search(plain_words(split_written_name(name)[0]))]
+    measured |= any(unit_suffix(unit) in RATE.units for unit in rates) and "end_time" not in found
     measured |= any(one.quantity == f"label {name}" for one, name in zip(columns, names, strict=True))
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
     is_framed = "end_time" in found and has_frames(names)

@@ -40,9 +40,10 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import HistoryError
-from creepkit.readers.conditions import StatedConditions
+from creepkit.readers.conditions import StatedConditions, StatedNumber
+from creepkit.readers.ends_of_tests import INTERRUPTED, RUPTURED, STOPPED, end_said_by
 from creepkit.readers.frames import UNUSED, TableFrames, column_question
-from creepkit.readers.imposed import OUTLIERS, hold_begins, under_load, unloaded
+from creepkit.readers.imposed import OUTLIERS, PAUSE, hold_begins, under_load, unloaded
 from creepkit.readers.table import SourceText
 from creepkit.readers.table_heads import LOAD_AGREEMENT
 from creepkit.readers.vocabulary import split_written_name, unit_suffix
@@ -75,8 +76,9 @@ CREEP_SHOWS = 0.01
 """Fraction of the stress that is lost within one frame of the ramp after its end, above which it bends the ramp."""
 
 
-PRELOAD, SHORT_RAMP, SOFTEST = 0.02, 1e-3, 20e3
-"""Of the largest stress, a preload at most; of the duration, a ramp in which creep is none; MPa, of a modulus."""
+PRELOAD, SHORT_RAMP, SOFTEST, JUMP = 0.02, 1e-3, 20e3, 0.1
+"""Of the largest stress, a preload at most; of the duration, a ramp in which creep is none; MPa, of a modulus; of the
+range of strains before, one that rises while the load is lost, as at a rupture."""
 
 
 FEWEST_RAMP_FRAMES, RAMP_FROM = 3, 0.2
@@ -268,6 +270,33 @@ def from_loading_on(conditions: StatedConditions, frames: TableFrames) -> TableF
     what = f"time counts from the end of a preload of {stress[before]:.3g} MPa at {time_text(start)}"
     conditions.record_assumption(what)
     return replace(frames, values={**values, "time": values["time"] - start}, lines=frames.lines[before:])
+
+
+def up_to_rupture(conditions: StatedConditions, frames: TableFrames, name: str) -> TableFrames:
+    """The frames up to the last one under load of a bar that broke: a logger goes on after that.
+
+    A load that falls to almost nothing for good while the strain jumps is asked about, where nothing says how it ended.
+    """
+    load, strain = (frames.values.get(one, np.zeros(1)) for one in ("stress", "strain"))
+    count = int(np.flatnonzero(load >= PAUSE * load.max())[-1]) + 1
+    if not 2 < count < load.size == strain.size:
+        return frames
+    said = {conditions.text_of("ended"), conditions.end_terms.get(name.casefold(), "")}
+    for text in (text for label, text in conditions.labels.items() if label != "assumed"):
+        said.add(conditions.end_terms.get(text.casefold(), "") or end_said_by(text))
+    is_marked = int(frames.lines[count]) in frames.marked  # the reading under load at that time was left out
+    if RUPTURED not in said and not conditions.states("rupture"):
+        is_open = said.isdisjoint((STOPPED, INTERRUPTED)) and not is_marked
+        if is_open and strain[count] - strain[count - 1] > JUMP * np.ptp(strain[:count]):
+            what = (
+                f"the load is lost at {time_text(float(frames.times[count]))} and the strain jumps; did the test break?"
+            )
+            raise conditions.question(what, "ended", RUPTURED, STOPPED, location=frames.location(count), is_free=False)
+        return frames
+    if is_marked and not conditions.states("rupture"):
+        conditions.put_number("rupture", StatedNumber(float(frames.times[count]), "", frames.location(count)))
+    conditions.record_assumption("readings without load after the rupture left out")
+    return replace(frames, values={n: one[:count] for n, one in frames.values.items()}, lines=frames.lines[:count])
 
 
 def _frames_of_ramp(times: Floats, stress: Floats) -> int:

@@ -186,17 +186,16 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         if kind_of_column(written) in (*FIRM, "remark"):
             what = f"column '{written}' holds words beside frames; is it a label of the test?"
             raise column_question(table, what, {written: LABEL}, {written: UNUSED})
-        near = get_close_matches(written, kinds, 1, cutoff=0.55)
-        meant = f"column '{written}' is not understood; " + (
-            f"did you mean '{near[0]}'?" if near else "what does it hold?"
-        )
+        near = [] if _OF_OTHERS.search(written) else get_close_matches(written, kinds, 1, cutoff=0.55)
+        asked = f"did you mean '{near[0]}'?" if near else "what does it hold?"
+        meant = f"column '{written}' is not understood; {asked}"
         likely = [name for name, one in OF_UNIT.items() if unit_suffix(unit) in one.units and name not in near]
         likely = [] if unit_suffix(unit) in (None, "") else [name for name in likely if name not in present]
         if _SHEAR.search(written):
             meant = f"'{written}' is of shear: a law's stress is sqrt(3) times it, its strain the shear strain over"
             meant, near, likely = f"{meant} sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
-        elif _OF_TUBES.search(written):
-            near, likely = (["pressure"] if "pressure" in kinds and "hoop" not in written.casefold() else []), []
+        elif _OF_OTHERS.search(written):
+            near, likely = (["pressure"] if "pressure" in kinds and _PRESSURE.search(written) else []), []
         named = [] if all(is_number(cell, table.dialect) for cell in cells_of(table.rows, k)) else [{written: "test"}]
         options = [{written: f"{one} ({unit})"} for one in (*near, *likely)]
         raise column_question(table, meant, *options, *named, {written: UNUSED})
@@ -210,8 +209,13 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
 
 
 _SHEAR = re.compile(r"shear|schub|scher|cisaillement|glissement", re.IGNORECASE)
-_OF_TUBES = re.compile(r"pressure|druck(?!fest)|pression|hoop", re.IGNORECASE)
-"""Names of columns that are no stress and no strain of a bar, though they have the unit of one."""
+_PRESSURE = re.compile(r"pressure|druck(?!fest)|pression", re.IGNORECASE)
+_OF_OTHERS = re.compile(
+    rf"{_PRESSURE.pattern}|hoop|net.?section|transvers|lateral|latéral|poisson|quer|radial|\brate\b|geschwindigkeit|vitesse"
+    r"|[\s_]f(?![a-z])|fracture|rupture|bruch|\broom|ambient|raumtemp|umgebung|ambiant",
+    re.IGNORECASE,
+)
+"""Names of columns that are no stress, axial strain over time or temperature of a bar, though they have such a unit."""
 
 
 _PLACE_OF_SENSOR = re.compile(

@@ -94,7 +94,10 @@ _REMAINING = re.compile("remaining|residual|relaxed|relaxation|rest-?spannung|rÃ
 def _ask_of_relaxation(conditions: StatedConditions, frames: TableFrames) -> None:
     """Ask for the strain that was held in a test whose column is called the remaining stress."""
     written = next((frames.table.as_written(k) for k, c in enumerate(frames.table.columns) if c[:6] == "stress"), "")
-    if not _REMAINING.search(written) or conditions.states_load("strain") or "strain" in frames.values:
+    if not _REMAINING.search(written) or "strain" in frames.values:
+        return
+    if conditions.states_load("strain"):
+        conditions.take_number("stress")  # the initial one, which is the first that is recorded
         return
     modulus, stress = conditions.number_of("modulus"), float(frames.values["stress"][0])
     what = f"'{quoted(written, 60)}' is that of a test whose strain was held, which is not stated; how large was it?"

@@ -69,11 +69,8 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
-        *("creep", "total creep", "total creep strain", "creep strain", "total strain", "engineering strain"),
-        *("true strain", "logarithmic strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
-        *("kriechdehnung", "gesamtdehnung", "zeitdehnung", "plastische dehnung", "bleibende dehnung", "déformation"),
-        *("déformation de fluage", "déformation totale", "allongement relatif", "deformation relative"),
-        "tensile strain extensometer",
+        *("creep", "total creep", "total creep strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
+        *("zeitdehnung", "déformation", "allongement relatif", "deformation relative", "tensile strain extensometer"),
     ),
     "diametral_strain": (
         *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
@@ -170,7 +167,22 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
 laboratories apart."""
 
 
-NAME_SYNONYMS: Mapping[str, str] = {name: meaning for meaning, names in NAMES_OF.items() for name in names}
+_TRUE = ("true strain", "logarithmic strain", "true creep strain", "hencky strain", "wahre dehnung", "eps true")
+STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
+    **dict.fromkeys(_TRUE, ("strain_measure", "logarithmic")),
+    "engineering strain": ("strain_measure", "engineering"),
+    **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
+    **dict.fromkeys(("ε tot", "eps tot", "ε total", "dehnung gesamt"), ("includes_elastic", "yes")),
+    **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
+    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), ("includes_elastic", "no")),
+}
+"""{name of a column of strains in small letters: key and text of the condition that it states}."""
+
+
+NAME_SYNONYMS: Mapping[str, str] = {
+    **{name: meaning for meaning, names in NAMES_OF.items() for name in names},
+    **dict.fromkeys(STATED_BY_NAME, "strain"),
+}
 """{name in small letters: quantity or text key}."""
 
 
@@ -188,16 +200,6 @@ SYMBOLS: Mapping[str, str] = {
     **dict.fromkeys(("h0", "H0", "h₀", "H₀"), "height"),
 }
 """{symbol: quantity}; capitals matter."""
-
-
-STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
-    **dict.fromkeys(("true strain", "logarithmic strain"), ("strain_measure", "logarithmic")),
-    "engineering strain": ("strain_measure", "engineering"),
-    **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
-    **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
-    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), ("includes_elastic", "no")),
-}
-"""{name of a column in small letters: key and text of the condition that it states}."""
 
 
 _IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]((?:[^()\[\]]|\(\w*\))*)[)\]]\s*([^()\[\]]*)")

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
-from creepkit.inverse.perturbation import beyond_intervals, combined_change_text
+from creepkit.inverse.nuisance_parameters import beyond_intervals, combined_change_text
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time

@@ -13,9 +13,8 @@ from creepkit.inverse.adequacy import UNDETECTED_SCATTER, noises_text
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.noise_model import MINIMUM_TESTS
-from creepkit.inverse.nuisance_parameters import nuisance_unit
+from creepkit.inverse.nuisance_parameters import NOT_INCLUDED, beyond_intervals, nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
-from creepkit.inverse.perturbation import NOT_INCLUDED, beyond_intervals
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION, Correlation
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit

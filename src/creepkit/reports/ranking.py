@@ -90,8 +90,7 @@ def _table(ranking: Ranking) -> Table:
 
 def _behind(ranking: Ranking) -> list[str]:
     """Why laws that have a smaller misfit than the best are behind it, a sentence each."""
-    best, found = ranking.laws[0], list[str]()
-    own = Description.of(best.fit)
+    best, own, found = ranking.laws[0], Description.of(ranking.best), list[str]()
     for one in ranking.laws[1:]:
         theirs = dict(Description.of(one.fit).items())
         smaller = [name for name, misfit in own.items() if theirs.get(name, math.inf) < SMALLER * misfit]

@@ -1,6 +1,8 @@
 """identify(): planted values come back inside their intervals, and what is not determined is said."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import creepkit as ck
 from creepkit.errors import FitError, FitWarning
 from creepkit.inverse.candidates import candidates, named_candidates
 from creepkit.inverse.cross_validation import cross_validate
-from creepkit.inverse.extrapolation import extrapolation_text
+from creepkit.inverse.extrapolation import extrapolation_text, outside_combinations
 from creepkit.inverse.history_checks import suspect_frames_note, without_suspect_frames
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
@@ -20,7 +22,7 @@ from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Nuisance, constant_stress
+from creepkit.records import History, Nuisance, StressSteps, constant_stress
 from helpers.steady_rate_predictor import Steady, planted
 
 LAW = NORTON.times(arrhenius(T_ref=1073.15))
@@ -169,9 +171,7 @@ def clean_and_spoilt() -> list[History]:
     times, rng = np.linspace(1e3, 4e4, 40), np.random.default_rng(0)
     strain = [1e-7 * times + 1e-5 * rng.standard_normal(times.size) for _ in range(2)]
     strain[1][20] += 1e-3
-    return [
-        History(name, times, {"strain": s}, constant_stress(50), 1000.0) for name, s in zip("ab", strain, strict=True)
-    ]
+    return [History(n, times, {"strain": s}, constant_stress(50), 1000.0) for n, s in zip("ab", strain, strict=True)]
 
 
 def test_the_frame_is_left_out_and_named() -> None:
@@ -219,26 +219,15 @@ def test_rates_and_exponents_warn_once_a_call_and_may_be_told_not_to(fit_of_two_
         assert caught[0].filename == __file__
         ask([20.0, 150.0], 990.0, warn=False)
         ask([50.0, 100.0], 1000.0)
-
-
-def test_a_rate_without_a_temperature_is_that_at_the_reference_temperature(fit_of_two_tests):
-    """The median of the tests, which the printed answer names."""
-    fit = fit_of_two_tests
-    np.testing.assert_array_equal(fit.rate(80.0), fit.rate(80.0, fit.reference.temperature))
-    assert fit.reference.temperature == 1025.0
-    assert fit.adequacy.explains  # of simulated tests without noise: what they round is no bend over the stress
-    assert "MPa, 752 °C" in fit.details()
+        np.testing.assert_array_equal(ask(80.0), ask(80.0, 1025.0))  # the median of the tests, where none is given
+    assert fit_of_two_tests.adequacy.explains  # of simulated tests without noise: what they round is no bend
 
 
 def test_a_law_without_temperature_states_nothing_of_another_temperature():
+    times, T = np.linspace(1e5, 1e7, 9), 873.15
     tests = [
         ck.simulate(
-            "norton",
-            "uniaxial",
-            {"A": 1e-16, "n": 4.0},
-            times=np.linspace(1e5, 1e7, 9),
-            loading=ck.constant_stress(s),
-            temperature=873.15,
+            "norton", "uniaxial", {"A": 1e-16, "n": 4.0}, times=times, loading=constant_stress(s), temperature=T
         )
         for s in (80.0, 100.0)
     ]
@@ -355,3 +344,17 @@ def test_tests_without_anything_to_identify_from_are_refused():
     ends = [ck.History("e", np.array([1e5]), {}, ck.constant_stress(100.0), 900.0, rupture_time=1e5)]
     with pytest.raises(FitError, match="curve or a minimum creep rate"):
         candidates(ends)
+
+
+def test_a_stress_that_falls_as_the_furnace_is_made_hotter_was_not_held_at_both_larger_values() -> None:
+    """100 MPa at 873 K, then 60 MPa at 923 K, beside 60 MPa at 873 K: a triangle in 1/T and ln stress."""
+    programs = StressSteps(((0.0, 100.0), (360e3, 60.0))), ck.Program.steps([(0.0, 873.0), (360e3, 923.0)])
+    both = History("both", 3600.0 * np.array([10.0, 50.0, 150.0, 200.0]), {}, *programs)
+    tests = (both, both.replace(name="cold", loading=constant_stress(60.0), temperature=873.0))
+    fit: Any = SimpleNamespace(histories=tests, simulated_stresses=[h.load_levels for h in tests])
+    T = 2.0 / (1.0 / 873.0 + 1.0 / 923.0)
+    asked = [(100.0, 873.0), (60.0, 873.0), (60.0, 923.0), (6000.0**0.5, T), (100.0, 923.0), (90.0, T), (40.0, 873.0)]
+    *inside, hot, between, low = (outside_combinations(fit, *np.array(point)[:, None]) for point in asked)
+    assert inside == [""] * 4
+    assert (hot.partition(" (")[0], low.partition(" (")[0]) == ("stress 100 MPa at 650 °C", "stress 40 MPa at 600 °C")
+    assert "holds 60 to 77.46 MPa there" in between

@@ -29,7 +29,9 @@ def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, correlation_length
 def residuals_of(values, slopes, present, times, effect, output=None):
     """Residuals of frames of equal noise."""
     output = np.zeros(values.shape, np.int64) if output is None else output
-    return Residuals(values, slopes, present, np.log(times), None, effect, output, np.ones(values.shape))
+    return Residuals(
+        values, slopes, present, np.log(times), np.zeros((*values.shape, 0)), effect, output, np.ones(values.shape)
+    )
 
 
 def made(tests, frames, seed, scatter):
@@ -129,7 +131,7 @@ def test_a_planted_discrepancy_of_two_outputs_is_found():
     output = np.tile(np.repeat([0, 1], frames), (150, 1))
     noise = np.where(output == 0, 0.02, 0.4)
     ones = np.ones_like(clock)
-    shape = Residuals(0 * ones, ones, ones > 0, clock, None, 0 * ones, output, ones,
+    shape = Residuals(0 * ones, ones, ones > 0, clock, np.zeros((*ones.shape, 0)), 0 * ones, output, ones,
                       discrepancy_unit=noise)  # fmt: skip
     parts = {"amplitude": OutputNoise(0.02), "width": OutputNoise(0.4)}
     truth = NoiseModel(parts, discrepancy=2.0, discrepancy_length=1.2)
@@ -248,7 +250,7 @@ def drawn(seed, **noise_model):
 def working(linear, errors=None, **known):
     estimator = WorkingNoiseEstimator(LIKELIHOOD, observations(**known), errors)
     previous = NoiseModel({name: OutputNoise(sd) for name, sd in zip(NAMES, NOISE, strict=True)})
-    return estimator.estimate(linear.residuals, previous, linear)
+    return estimator.estimate(linear, previous)
 
 
 def parts(noise_model):

@@ -9,7 +9,7 @@ import creepkit as ck
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.perturbation import DRIFT
+from creepkit.inverse.nuisance_parameters import DRIFT
 from creepkit.inverse.perturbations import (
     OFFSET_IN_NOISES,
     USUAL_DRIFT,

@@ -326,5 +326,34 @@ def test_lost_readings_pauses_and_extrapolated_points(read):
 def test_rows_below_the_readings_that_begin_with_words_are_remarks(read, footers):
     (test,) = read(f"Stress (MPa);80\nTemperature (°C);600\nTime (h);Strain (%)\n0;0\n1;0,5\n100;0,75\n{footers}\n")
     assert (test.times[-1], test.outputs["strain"][-1]) == (360000.0, 0.0075)
-    assert "is a remark" in test.labels["assumed"]
     assert (test.rupture_time, test.unruptured) == (105 * 3600.0 if "105" in footers else None, "UN" in footers)
+
+
+LOADED = "Time (h);Stress (MPa);Strain (%);Note\n0;140;0;\n1;140;0,05;\n10;140;0,2;\n50;140;0,5;\n99;140;3;\n"
+
+
+@pytest.mark.parametrize(
+    ("head", "after", "hours"),
+    [
+        ("Bemerkung;Probe gebrochen\n", "100;0,5;25;rompue\n101;0,4;25;\n102;0,5;25;\n", 99),
+        ("Remark;broken\n", "99;0;25;\n100;0;25;\n", 99),
+        ("Rupture time (h);99,5\n", "100;0;25;\n101;0;25;\n", 99.5),
+    ],
+)
+def test_what_a_logger_took_after_fracture_is_left_out(read, head, after, hours):
+    (test,) = read(C + head + LOADED + after)
+    assert (test.loading.steps, test.rupture_time) == (((0.0, 140.0),), hours * 3600.0)
+    assert test.times[-1] <= 99 * 3600.0
+
+
+def test_a_load_that_is_lost_is_asked_about_where_the_strain_jumps_and_is_a_step_where_it_falls(read):
+    with pytest.raises(HistoryError, match=r"the load is lost at 100 h and the strain jumps; .* ended = \"ruptured\""):
+        read(f"{C}{LOADED}100;0;25;\n101;0;25;\n")
+    (test,) = read(f"{C}{LOADED}99;0;2,9;\n100;0;2,8;\n")
+    assert test.loading.steps[-1] == (99 * 3600.0, 0.0)
+
+
+def test_the_initial_stress_of_a_relaxation_may_stand_beside_its_strain(read):
+    text = f"{C}Initial stress (MPa);200\nE (GPa);160\n%sTime (h);Remaining stress (MPa)\n0;200\n1;180\n10;150\n"
+    (test,) = read(text % "strain_pct;0.125\n")
+    assert (test.specimen, test.outputs["stress"].tolist()) == ("relaxation", [200.0, 180.0, 150.0])

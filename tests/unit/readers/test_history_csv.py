@@ -116,13 +116,6 @@ def test_frames_of_one_time_become_their_mean_and_are_counted(read):
     assert history.labels["merged_frames"] == "2"
 
 
-@pytest.mark.parametrize("text", ["\ufeff{}", "{}\n\n", "{}   \n"])
-def test_marks_blank_lines_and_spaces_do_not_matter(read, text):
-    plain = CREEP + "time_s,strain_1\n0,0\n1,0.1"
-    assert read(text.format(plain)).outputs["strain"].tolist() == [0.0, 0.1]
-    assert read(plain.replace("\n", "\r\n").replace(",", " , ")).times.tolist() == [0.0, 1.0]
-
-
 def test_words_of_another_laboratory(read):
     words = HeaderVocabulary(
         synonyms={"Zeit_h": "time_h", "Dehnung_pct": "strain_pct", "Pruefspannung_MPa": "stress_MPa"},

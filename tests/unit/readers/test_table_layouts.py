@@ -104,8 +104,9 @@ def test_titles_comments_blank_lines_and_footers(read):
     assert "line 14 is a remark (End of the record)" in history.labels["assumed"]
 
 
-def test_what_a_name_of_a_column_states(read):
-    (history,) = read("# T_C: 850\n# stress_MPa: 60\nTime (h),True strain (%)\n0,0\n1,0.5\n")
+@pytest.mark.parametrize("name", ["True strain", "True creep strain", "Hencky strain", "wahre Dehnung", "eps_true"])
+def test_what_a_name_of_a_column_states(read, name):
+    (history,) = read(f"# T_C: 850\n# stress_MPa: 60\nTime (h),{name} (%)\n0,0\n1,0.5\n")
     assert history.strain_measure == "logarithmic"
     with pytest.raises(HistoryError, match="x.csv:3: strain_measure is 'engineering', but .*x.csv:4, column .True s"):
         read("# T_C: 850\n# stress_MPa: 60\n# strain_measure: engineering\nTime (h),True strain (%)\n0,0\n1,1\n")
@@ -194,6 +195,7 @@ REFUSED = [
     ("time_h,strain_pct\n0,0\n1,1\nnan,nan\n", "x.csv:6: 'time_h' is 'nan'; write a finite"),
     ("Time (h);A1;A2\n0;0;0\n1;1;1\n", "x.csv:3: the column 'A1' does not say what it"),
     ("Time (h),Strain 1 (%),Strain 2 (%)\n0,0,0\n1,1,1\n", "x.csv:3: several columns of one quan"),
+    ("Time (h),Strain (%),Room temp (°C)\n0,0,2\n1,1,2\n", r'what does it hold\? .* = {"Room temp .* = "unused"}$'),
     ("Time (h),Plastic strain (%),Strain (%)\n0,0,0\n1,1,1\n", "x.csv:3: column 'Plastic strain .*is n"),
     (
         "Time (h);A1 strain (%);A1 strain (%)\n0;0;0\n1;1;1\n",

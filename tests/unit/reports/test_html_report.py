@@ -17,7 +17,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError, ReportError
 from creepkit.exporters.documents import equations_in_latex, law_equations
 from creepkit.inverse.identify import identify
-from creepkit.inverse.perturbation import Perturbation, combined_change_text
+from creepkit.inverse.nuisance_parameters import Perturbation, combined_change_text
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings

@@ -232,7 +232,7 @@ SAME_COORDINATES = 0.02
 
 
 WORKING_ERROR = 0.3
-"""Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
+"""Misfit that is assumed in a search, over that spread (see WorkingNoiseEstimator.initial)."""
 
 
 MOST_MINIMA, LARGEST_COST = 2, 4.0

@@ -39,8 +39,7 @@ from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_EXCESS, DECISIVE_WEIGHT, evidence_weights
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import prior_mean
-from creepkit.inverse.perturbation import DRIFT, OFFSET, Perturbation
+from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, prior_mean
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import System, Tolerances

@@ -32,7 +32,7 @@ from creepkit.inverse.evidence import DECISIVE_EXCESS, occam_penalty
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
-from creepkit.inverse.perturbation import Perturbation
+from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
@@ -89,14 +89,15 @@ def under_common_covariance(
 
 def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     """A law's residuals, with the derivatives that make the covariance, of the best law."""
-    offset_sensitivity, rate_effect = (
-        np.where(reference.present, reference_values, own_values)
-        for reference_values, own_values in (
-            (reference.offset_sensitivity, residuals.offset_sensitivity),
-            (reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
-        )
+
+    def best(of_best: Floats, own: Floats) -> Floats:
+        return np.where(reference.present, of_best, own)
+
+    return replace(
+        residuals,
+        offset_sensitivity=best(reference.offset_sensitivity, residuals.offset_sensitivity),
+        log_rate_sensitivity=best(reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
     )
-    return replace(residuals, offset_sensitivity=offset_sensitivity, log_rate_sensitivity=rate_effect)
 
 
 def score_under_own_covariance(fit: Identification, linearised: LinearisedProblem, frames: float) -> float:
@@ -121,20 +122,11 @@ def _optimum_under(
     without_parameter_priors = replace(linearised, precision=precision)
     step = np.zeros(precision.size)
     step[linearised.free] = without_parameter_priors.step_within(factor)
-    chi_square, whitened = _chi_square(without_parameter_priors, factor, step)
+    chi_square, whitened = without_parameter_priors.chi_square(factor, step)
     stopped = linearised.residuals.stopped
     score = chi_square + stopped.log_variance + stopped.chi_square + factor.log_determinant
     score += occam_penalty(linearised, factor)
-    return chi_square + stopped.chi_square, score, whitened, step
-
-
-def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:
-    residuals = linearised.residuals
-    assert residuals.jacobian is not None
-    whitened = factor.whiten(residuals.values + residuals.jacobian @ step)
-    prior_deviation = linearised.prior_residual + step
-    total = (whitened**2).sum() + (linearised.precision * prior_deviation**2).sum()
-    return float(total), np.where(residuals.present, whitened, 0.0).ravel()
+    return chi_square + stopped.chi_square, score, np.where(linearised.residuals.present, whitened, 0.0).ravel(), step
 
 
 SAME_FUNCTION = 0.05

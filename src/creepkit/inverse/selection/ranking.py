@@ -223,7 +223,7 @@ def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
     if named and ranking.singled_out and adequacy is not None:
         explains = f"is not rejected by the tests{adequacy.qualification}"
-        return f"of {count} laws tried {best} has nearly all the weight ({weight}) and {explains}; but {named}"
+        return f"of {count} laws tried {best} has nearly all the weight ({weight}); it {explains}; but {named}"
     reasons = dict.fromkeys([ranking.adequacy_text, *(why for name, why in unmet.items() if name != "convergence")])
     return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"
 

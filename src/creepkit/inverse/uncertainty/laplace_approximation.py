@@ -117,7 +117,7 @@ def covariance_of_values(
     working_noise : under whose covariance, 1 / W, values were found that are not by likelihood, with the covariance
     M (J'W C W J + P) M, M = (J'W J + P)^-1.
     """
-    residuals, free = linearised.residuals, replace(linearised, free=np.ones_like(linearised.free))
+    residuals, free = linearised.residuals, linearised.whole
     if working_noise is None:
         return free.solve(CovarianceFactor.of_residuals(residuals, noise_model)).covariance
     plain = replace(residuals, random_effect_sensitivities=None, common_effects=None)

@@ -156,7 +156,6 @@ class Posterior:
         """The posterior of an identification, about its optimum, given what the errors of its tests are there."""
         problem, noise_model = fit.least_squares_problem, fit.noise_model
         residuals, nuisances, count = problem.residuals(fit.x), problem.nuisance_parameters, fit.u.size
-        assert residuals.jacobian is not None
         e = fit.x[count:]
         factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
         rate_effect = residuals.log_rate_sensitivity * noise_model.rate

@@ -32,11 +32,11 @@ from scipy.special import ndtr
 
 from creepkit.arrays import Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor
-from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, Residuals
+from creepkit.inverse.noise_model import ASSUMED_RATE_SD, NoiseModel, known_sd
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, LinearisedProblem, scaled_inverse
-from creepkit.records import History, Nuisance
+from creepkit.records import History
 
 USUAL_SD = {"test": ASSUMED_RATE_SD, "heat": 0.5, "laboratory": 0.3}
 """Of ln rate: what is usual of each level, u."""
@@ -331,12 +331,10 @@ def log_prior(sd: Floats, levels: Sequence[str], reach: float = 1.0) -> Floats:
 def redundant_rates(linear: LinearisedProblem, noise_model: NoiseModel) -> int:
     """How many combinations of the rates of tests no unknown moves, within its prior, by more than SMALLEST_FACTOR."""
     residuals = linear.residuals
-    assert residuals.jacobian is not None
     factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
     weighted = factor.inverse_times(residuals.log_rate_sensitivity)
     information = np.maximum((weighted * residuals.log_rate_sensitivity).sum(axis=1), 1e-300)
-    moved = np.einsum("te,tep->tp", weighted, residuals.jacobian) / information[:, None]
-    moved /= np.sqrt(np.maximum(linear.precision, 1e-300))
+    moved = np.einsum("te,tep->tp", weighted, residuals.jacobian) / information[:, None] * linear.prior_sd
     return len(moved) - int((np.linalg.svd(moved, compute_uv=False) > SMALLEST_FACTOR).sum())
 
 
@@ -353,51 +351,15 @@ def rate_scatter(
         tests beside their rates, such as a thickness within its tolerance. errors : (unknowns, unknowns) as
         RateScatter has them.
     """
-    count, nuisances, residuals = problem.parameter_count, problem.nuisance_parameters, linear.residuals
-    from_prior_means = linear.prior_residual[count:]
+    nuisances, count, observations = problem.nuisance_parameters, problem.parameter_count, problem.observations
+    integrated = count + np.array(nuisances.integrated, np.int64)
     prior_gradient = linear.precision * linear.prior_residual
-    integrated = [
-        count + k
-        for k, n in enumerate(nuisances.nuisances[: nuisances.size])
-        if n.scope == "test" and np.isfinite(nuisances.sd[k])
-    ]
     prior_gradient[integrated] = 0.0
-    at_prior_means = nuisances.integrate_out(residuals, nuisances.mean[: nuisances.size] + from_prior_means)
-    observations = problem.observations
-    transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
-    return RateScatter(
-        tests=tuple(h.name for h in problem.histories),
-        members=_members(problem.histories),
-        common=_common_members(problem.histories),
-        known=_known_sd(problem.settings.nuisances),
-        stresses=problem.conditions[0],
-        temperatures=problem.conditions[1],
-        errors=errors,
-        reach=max(1.0, REACH * noise_model.rate / USUAL_SD["test"]),
-        output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
-        output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
-        **_evidence(
-            at_prior_means, replace(noise_model, rate=0.0), integrated, (linear.precision, prior_gradient), test_effects
-        ),
-    )
-
-
-def _evidence(
-    residuals: Residuals,
-    noise_model: NoiseModel,
-    integrated: Sequence[int],
-    prior: tuple[Floats, Floats],
-    test_effects: Sequence[Floats],
-) -> dict[str, Floats]:
-    """What tests say: `log_factor`, `variance`, `design`, `precision` and `gradient` of a RateScatter.
-
-    residuals : at prior means of nuisance parameters of tests; integrated : positions of these among the unknowns.
-    prior : precision and gradient, (unknowns,) each.
-    """
-    assert residuals.jacobian is not None
+    e = nuisances.mean[: nuisances.size] + linear.prior_residual[count:]
+    residuals = nuisances.integrate_out(linear.residuals, e)
     jacobian = residuals.jacobian.copy()
-    jacobian[..., list(integrated)] = 0.0
-    factor = CovarianceFactor.of_residuals(residuals, noise_model)
+    jacobian[..., integrated] = 0.0
+    factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
     effects = np.stack([residuals.values, *test_effects], axis=-1)
     weighted_rate = factor.inverse_times(residuals.log_rate_sensitivity)
     information = np.maximum(np.einsum("te,te->t", weighted_rate, residuals.log_rate_sensitivity), 1e-12)
@@ -405,17 +367,28 @@ def _evidence(
     projected = np.einsum("te,tep->tp", weighted_rate, joined) / information[:, None]
     design, log_factor = projected[:, effects.shape[-1] :], -projected[:, 0]
     weighted = factor.inverse_times(jacobian)
-    precision = np.einsum("tep,teq->pq", weighted, jacobian) + np.diag(prior[0])
+    precision = np.einsum("tep,teq->pq", weighted, jacobian) + np.diag(linear.precision)
     precision -= np.einsum("tp,t,tq->pq", design, information, design)
-    gradient = np.einsum("tep,te->p", weighted, residuals.values) + prior[1]
+    gradient = np.einsum("tep,te->p", weighted, residuals.values) + prior_gradient
     gradient += design.T @ (information * log_factor)
-    return {
-        "log_factor": log_factor,
-        "variance": 1.0 / information + (projected[:, 1 : effects.shape[-1]] ** 2).sum(axis=1),
-        "design": design,
-        "precision": 0.5 * (precision + precision.T),
-        "gradient": gradient,
-    }
+    transforms = dict(zip(observations.outputs, observations.transforms, strict=True))
+    return RateScatter(
+        tests=tuple(h.name for h in problem.histories),
+        members=_members(problem.histories),
+        log_factor=log_factor,
+        variance=1.0 / information + (projected[:, 1 : effects.shape[-1]] ** 2).sum(axis=1),
+        design=design,
+        precision=0.5 * (precision + precision.T),
+        gradient=gradient,
+        common=_common_members(problem.histories),
+        known=known_sd(problem.settings.nuisances, "rate"),
+        stresses=problem.conditions[0],
+        temperatures=problem.conditions[1],
+        errors=errors,
+        reach=max(1.0, REACH * noise_model.rate / USUAL_SD["test"]),
+        output_scales={n: t.scale for n, t in transforms.items() if isinstance(t, LinearTransform)},
+        output_floors={n: t.floor for n, t in transforms.items() if isinstance(t, LogTransform)},
+    )
 
 
 def _members(histories: Sequence[History]) -> dict[str, tuple[str, ...]]:
@@ -451,11 +424,3 @@ def unstated_member_notes(histories: Sequence[History]) -> list[str]:
             assumed = f"{one} of {level} {common[level]}, as the others are" if level in common else own
             notes.append(f"{tests} no {level}: taken for {assumed}")
     return notes
-
-
-def _known_sd(nuisances: Sequence[Nuisance]) -> float | None:
-    """The standard deviation of the rate where a nuisance gives it; 0 without such a nuisance; else None."""
-    for nuisance in nuisances:
-        if nuisance.kind == "rate":
-            return nuisance.sd
-    return 0.0

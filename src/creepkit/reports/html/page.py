@@ -146,6 +146,7 @@ def block_shown(block: Block, names: LawNames) -> Block:
             figures=[cells(one) for one in block.figures],
             cautions=[said(one) for one in block.cautions],
             next_step=said(block.next_step),
+            brackets=said(block.brackets) if block.brackets else "",
         )
     return block
 
