@@ -35,6 +35,10 @@ LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 test over the longest of these."""
 
 
+LONGEST_INTERVAL = 1e7
+"""s, between frames: tests of years are read once in four months at least."""
+
+
 SETUP_HOURS = 1.0
 """Oven hours of a run beside its test, where nothing is said: heating, mounting, cooling."""
 
@@ -81,7 +85,7 @@ class Rig(Options, title="settings of a rig"):
     setup_hours: float = option(
         SETUP_HOURS, "Of the oven for each run, beside its test.", numbers_between(0, 1e7), key="setup_h"
     )
-    frame_interval: float = option(900.0, "Between frames.", numbers_between(0, 1e7, above=True), unit="s")
+    frame_interval: float = option(900.0, "Between frames.", numbers_between(0, LONGEST_INTERVAL, above=True), unit="s")
     load_changes: bool = True
     largest_output: float = float("inf")
 
@@ -156,7 +160,7 @@ def _rig_of(tests: Sequence[History], predictor: Predictor) -> Rig:
         longest_hours=EXTENSION * max(float(h.times[-1]) for h in tests) / 3600.0,
         temperatures=tuple(temperatures),
         dimensions=_dimensions(tests, predictor),
-        frame_interval=float(np.median([h.times[-1] / h.times.size for h in tests])),
+        frame_interval=min(float(np.median([h.times[-1] / h.times.size for h in tests])), LONGEST_INTERVAL),
         largest_output=LARGEST_GROWTH * largest if largest > 0 else float("inf"),
     )
 

@@ -140,7 +140,7 @@ class Adequacy:
     @property
     def verdict(self) -> AdequacyVerdict:
         """What contradicts the law comes before what is not known of it."""
-        if self.leaves_readings or self.contradicting is not None or self.contradicted_by_rates:
+        if self.leaves_readings or self.remedies or self.contradicting is not None or self.contradicted_by_rates:
             return "leaves a discrepancy"
         return "explains" if self.outputs and not self.unpredicted else "cannot be judged"
 
@@ -302,7 +302,7 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
-        if self.scatters_too_much and not self.explanations:
+        if (self.scatters_too_much or (self.remedies and not parts)) and not self.explanations:
             parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
         if self.contradicting is not None:
             parts.append(str(self.contradicting))

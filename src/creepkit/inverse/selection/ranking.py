@@ -304,7 +304,7 @@ def ranking_from_scores(
     scores = np.where(predicted, scores, np.inf) if predicted.any() else scores
     excess, weight = evidence_weights(scores)
     standing = [*range(len(fits))] if rates is None else rates.standing([fit.u for fit in fits], scores)
-    weight = np.bincount(standing, weight, len(fits)).astype(float)
+    weight = np.minimum(np.bincount(standing, weight, len(fits)), 1.0)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     names = [fits[law].law.name if law != k else "" for k, law in enumerate(standing)]

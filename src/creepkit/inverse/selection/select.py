@@ -20,6 +20,7 @@ from creepkit.errors import CreepkitError, FitError, LawError
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
+from creepkit.inverse.explanation import VERDICT_ODDS
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import describing, identify, sampled_where_needed
 from creepkit.inverse.reference_conditions import with_arrhenius
@@ -200,8 +201,10 @@ def _identify_all(
     return fits
 
 
-LEAST_STRAIN = 0.02
-"""Largest measured, from which on curves show what was held: the stress of a bar under load has grown by as much."""
+LEAST_STRAIN, LARGE_SCATTER = 0.005, 0.2
+"""Largest strain measured, from which on curves show what was held: the stress of a bar under load has grown by as
+much; and scatter of ln rate between tests, from which on that may be what made it: a stress exponent that the bend of
+curves sets leaves the rates of tests behind."""
 
 
 HELD_INSTEAD = {
@@ -214,7 +217,8 @@ HELD_INSTEAD = {
 def with_hold_tried(fit: Identification) -> Identification:
     """The identification, with what was held among the remedies where the law then explains its tests."""
     adequacy = fit.adequacy
-    if adequacy is None or not adequacy.misses_shape() or adequacy.is_explained or fit.predictor is None:
+    scatters = adequacy is not None and adequacy.rate_scatter > LARGE_SCATTER
+    if adequacy is None or not (adequacy.misses_shape() or scatters) or adequacy.is_explained or fit.predictor is None:
         return fit
     others = [held_otherwise(history.loading) for history in fit.histories]
     held = {other[1] for other in others if other is not None}
@@ -224,8 +228,9 @@ def with_hold_tried(fit: Identification) -> Identification:
     settings = replace(fit.settings, weights="likelihood")
     start = StartingEstimate.from_identification(fit, values_only=True)
     with suppress(CreepkitError):
-        otherwise = identify(fit.law, tests, fit.predictor, settings=settings, start=start).adequacy
-        if otherwise is not None and otherwise.explains:
+        found = identify(fit.law, tests, fit.predictor, settings=settings, start=start)
+        likelier = adequacy.rejects or found.log_likelihood > fit.log_likelihood + VERDICT_ODDS
+        if found.adequacy is not None and found.adequacy.explains and likelier:
             remedies = (HELD_INSTEAD[held.pop()], *adequacy.remedies)
             return replace(fit, adequacy=replace(adequacy, remedies=remedies))
     return fit

@@ -41,3 +41,14 @@ def test_what_is_stated_rightly_has_no_remedy(held):
     assert fit.adequacy.explains
     assert fit.adequacy.remedies == ()
     assert fit.values["n"] == pytest.approx(N, abs=0.02)
+
+
+def test_an_exponent_that_the_bend_of_curves_sets_leaves_the_rates_behind():
+    """Strain 0.018 (s / 140 MPa)^4.8 (t / 4000 h)^0.4 of a true stress, stated as a load, to 0.4 % of itself."""
+    rng, times, tests = np.random.default_rng(1), np.geomspace(1e5, 1.44e7, 30), []
+    for stress in (100.0, 110.0, 120.0, 130.0, 140.0):
+        values = 0.018 * (stress / 140.0) ** 4.8 * (times / 1.44e7) ** 0.4 * np.exp(0.004 * rng.normal(size=30))
+        tests.append(ck.History(f"{stress:g}", times, {"strain": values}, ck.constant_stress(stress, "load"), 873.15))
+    fit = ck.identify("time-hardening", tests)
+    assert fit.adequacy.rejects
+    assert "(control = stress)" in fit.adequacy.remedies[0]
