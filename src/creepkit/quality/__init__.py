@@ -9,6 +9,7 @@ nothing crept.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import get_args
 
@@ -24,7 +25,9 @@ from creepkit.quality.loading_strain import unstated_loading_strain
 from creepkit.quality.repeats import copied_tests, repeated_rows, replicate_deviations
 from creepkit.quality.rig import expansion_flags, find_jumps, jump_flags, record_flags
 from creepkit.readers.ends_of_tests import invalidity_said_by
+from creepkit.readers.vocabulary import unit_suffix
 from creepkit.records import History, known_specimens, output_named
+from creepkit.records.units import UNITS
 
 __all__ = [
     "FRAME_FLAG_KINDS",
@@ -39,6 +42,10 @@ __all__ = [
     "repeated_row_notes",
     "without_copies",
 ]
+
+
+LEVEL_AGREEMENT = 2e-3
+"""Relative, of a level that a remark names and one of the test."""
 
 
 FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("fracture", "unloading", "falling", "outlier")
@@ -101,8 +108,32 @@ def _unstated_moduli(histories: Sequence[History]) -> Iterator[QualityFlag]:
         yield QualityFlag(tuple(names), "modulus", (), "no simulation goes without it", proposal=STATE_MODULUS)
 
 
+_CHANGED = re.compile(
+    r"increas|rais|lower|reduc|chang|stepp|erhöh|gesenkt|senk|geändert|gesteigert|augment|rédui|abaiss|modifi|port[ée]",
+    re.IGNORECASE,
+)
+_LEVEL = re.compile(r"(\d+(?:[.,]\d+)?)\s*(MPa|ksi|psi|N/mm2|N/mm²|° ?[CF]|deg\.? ?[CF]|K)(?!\w)")
+
+
+def _changes_told(history: History) -> Iterator[tuple[str, str]]:
+    """Labels that tell of a change to a stress or a temperature that the test never has, and that level."""
+    programs = {"temperature": history.temperature_program(), history.loading.quantity: history.loading.program()}
+    for label, text in history.labels.items() if history.outputs else ():
+        levels = _LEVEL.findall(text) if label != "assumed" and _CHANGED.search(text) else ()
+        for number, written in levels:
+            unit = UNITS[unit_suffix(written) or "MPa"]
+            value = unit.conversion.factor * float(number.replace(",", ".")) + unit.conversion.offset
+            program = programs.get(unit.quantity)
+            if program is not None and np.abs(program.values - value).min() > LEVEL_AGREEMENT * value:
+                yield label, f"{number} {written}"
+
+
 def remark_flags(histories: Sequence[History]) -> Iterator[QualityFlag]:
-    """Tests of which a remark says that they do not count."""
+    """Tests of which a remark says that they do not count, or that their load or temperature was changed."""
+    for history in histories:
+        for label, level in _changes_told(history):
+            reason = f"'{label}' tells of a change to {level}, which the test never has"
+            yield QualityFlag((history.name,), "remark", (), reason, proposal="state its steps in the head of its file")
     for history in histories:
         for label, text in history.labels.items():
             if label != "assumed" and invalidity_said_by(text) == "invalid":

@@ -357,3 +357,11 @@ def test_the_initial_stress_of_a_relaxation_may_stand_beside_its_strain(read):
     text = f"{C}Initial stress (MPa);200\nE (GPa);160\n%sTime (h);Remaining stress (MPa)\n0;200\n1;180\n10;150\n"
     (test,) = read(text % "strain_pct;0.125\n")
     assert (test.specimen, test.outputs["stress"].tolist()) == ("relaxation", [200.0, 180.0, 150.0])
+
+
+def test_a_remark_on_a_change_that_the_test_never_has_is_flagged(read):
+    told = {"stress increased to 160 MPa": "160 MPa", "Temperatur auf 570 °C erhöht": "570 °C", "raised to 140 MPa": ""}
+    for remark, level in told.items():
+        tests = read(f"{C}{MPA}Remark;{remark}\n{STRAIN}0;0\n1;0,05\n10;0,2\n100;0,9\n")
+        reasons = [one.reason for one in ck.check_data_quality(tests).flags if one.kind == "remark"]
+        assert reasons == [f"'Remark' tells of a change to {level}, which the test never has"] * bool(level)

@@ -130,13 +130,10 @@ def test_extensions_that_hold_the_loading_strain(tmp_path: Path, name: str, at_s
     assert "subtracted" in test.labels["assumed"]
 
 
-@pytest.mark.parametrize(
-    ("end", "rupture"),
-    [
-        *((end, 218700.0) for end in ("test piece break", "Specimen rupture", "failure of test piece", "broken")),
-        *((end, None) for end in ("Time limit", "no rupture", "interruption")),
-    ],
-)
+ENDS = {"Specimen rupture": 218700.0, "test piece break": 218700.0, "Time limit": None, "no rupture": None}
+
+
+@pytest.mark.parametrize(("end", "rupture"), ENDS.items())
 def test_how_a_test_ended(tmp_path: Path, end: str, rupture: float | None):
     changes = {"endOfTestCriterium": {"endOfTestCriteriumOptions": end}}
     (test,) = ck.read_histories(write(tmp_path, document(rupture=value("Not applicable", "h"), **changes)))
