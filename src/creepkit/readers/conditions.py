@@ -38,7 +38,7 @@ from creepkit.readers.vocabulary import (
     split_unit,
     unit_suffix,
 )
-from creepkit.records import Program
+from creepkit.records import History, Program
 from creepkit.records.quantities import LENGTH, TIME, QuantityKind
 
 _ALLOWED_COMBINATIONS = (
@@ -293,7 +293,7 @@ class StatedConditions:
         is_known, is_smooth = name in self.terms.outputs, _SMOOTH.search(name)
         if not is_known and not is_smooth and _NOTCHED.search(name):
             what = f"'{quoted(entry.text, 60)}' is said of the specimen; which is it?"
-            raise self.question(what, "specimen", "notched-bar", "uniaxial", location=entry.location)
+            raise self.question(what, "specimen", "notched-bar", History.specimen, location=entry.location)
         if is_known or (SPECIMEN_NAME_PATTERN.fullmatch(entry.text) and not is_smooth):
             self._put(self._texts, "specimen", replace(entry, text=name), entry)
         elif near := get_close_matches(name, self.terms.outputs, 1, cutoff=CLOSE_SPELLING):

@@ -421,3 +421,18 @@ def with_commas_of_remarks(table: CellTable, rows: Sequence[TableRow], names: Se
             row = TableRow(row.line, [*before, ", ".join(filter(None, remark))])
         found.append(row)
     return found
+
+
+_PAGE = re.compile(r"\b(?:page|seite|blatt)\b", re.IGNORECASE)
+
+
+def without_page_heads(table: CellTable) -> CellTable:
+    """The table without the lines at the beginning of further pages, which repeat that of the first one."""
+    seen, rows = set[str](), list[TableRow]()
+    for row in table.rows:
+        text = " ".join(row.cells)
+        plain = re.sub(r"\d+", "", text) if _PAGE.search(text) else ""
+        if plain not in seen:
+            rows.append(row)
+            seen |= {plain} if plain else set()
+    return replace(table, rows=rows)

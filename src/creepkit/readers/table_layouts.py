@@ -29,6 +29,7 @@ from creepkit.readers.table import (
     named_columns,
     some_of,
     with_columns,
+    without_page_heads,
 )
 from creepkit.readers.table_heads import (
     HeadedTable,
@@ -272,7 +273,7 @@ class Layout:
 
 def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests of a table; HistoryError, in one sentence, where it cannot be told how it is laid out."""
-    table = _without_page_heads(table)
+    table = without_page_heads(table)
     blocks = _blocks(table, vocabulary.terms())
     if not blocks:
         headed = headed_table(table, vocabulary)
@@ -287,24 +288,11 @@ def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTe
 # ---- blocks below one another ----------------------------------------------------------------------------------------
 
 
-_PAGE = re.compile(r"\b(?:page|seite|blatt)\b", re.IGNORECASE)
 _TITLE_OF_TEST = re.compile(
     r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|bar)[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
     r"(\S.*)",
     re.IGNORECASE,
 )
-
-
-def _without_page_heads(table: CellTable) -> CellTable:
-    """The table without the lines at the beginning of further pages, which repeat that of the first one."""
-    seen, rows = set[str](), list[TableRow]()
-    for row in table.rows:
-        text = " ".join(row.cells)
-        plain = re.sub(r"\d+", "", text) if _PAGE.search(text) else ""
-        if plain not in seen:
-            rows.append(row)
-            seen |= {plain} if plain else set()
-    return replace(table, rows=rows)
 
 
 def _blocks(table: CellTable, known: Terms) -> list[CellTable]:

@@ -27,7 +27,6 @@ def test_moduli_that_the_histories_state_wrongly_are_found() -> None:
     assert (np.abs(found.values / planted_moduli - 1) < 0.05).all()
     assert found.elastic is not None
     assert found.elastic.at(760 + 273.15).E == pytest.approx(104e3, rel=0.03)
-    assert "GPa at" in str(found)
 
 
 def test_wachtman_through_its_own_values() -> None:

@@ -20,8 +20,6 @@ def test_records_print_as_text() -> None:
     ranking = rank([fit])
     texts = [str(record) for record in (*RECORDS, fit, ranking, ranking.model_average, fit.correlation())]
     assert [text for text in texts if not text.strip() or "object at" in text] == []
-    samples = fit.sample(draws=20)
-    np.testing.assert_array_equal(samples.to_dataframe()["n"], samples.values["n"])
 
 
 def test_every_text_of_an_answer_is_short_and_says_when_it_is_said() -> None:

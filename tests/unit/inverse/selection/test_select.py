@@ -337,13 +337,10 @@ def test_the_evidence_is_the_probability_of_the_readings_with_the_parameters_int
     linear, noise, sd = law(0).linear_problem, law(0).noise_model, np.array([3.0, 0.2, 40.0])
     ones, clock = linear.residuals.values**0, linear.residuals.correlation_coordinate
     jacobian = np.stack([ones, clock, 0.0 * ones], axis=-1)  # the level, the slope, and what changes nothing
-    ends = np.array([[-1.0], [1.0]]) * 1e9
-    linear = LinearisedProblem(
-        replace(linear.residuals, jacobian=jacobian), sd**-2, np.zeros(3), sd > 0, ends * np.ones(3), np.zeros(3)
-    )
+    residuals, box = replace(linear.residuals, jacobian=jacobian), linear.step_bounds * np.ones(3)
+    linear = LinearisedProblem(residuals, sd**-2, np.zeros(3), sd > 0, box, np.zeros(3))
     factor = CovarianceFactor.of_residuals(linear.residuals, noise)
-    rates = np.kron(np.eye(TESTS), np.ones((ENTRIES, ENTRIES))) * 0.5**2
-    rows = jacobian.reshape(-1, 3) * sd
+    rates, rows = np.kron(np.eye(TESTS), np.full((ENTRIES, ENTRIES), 0.5**2)), jacobian.reshape(-1, 3) * sd
     whole = np.eye(TESTS * ENTRIES) + rates + rows @ rows.T
     assert occam_penalty(linear, factor) + factor.log_determinant == pytest.approx(np.linalg.slogdet(whole)[1])
     assert occam_penalty(linear.of([0]), factor) == pytest.approx(np.log1p(9.0 * TESTS / (0.5**2 + 1.0 / ENTRIES)))

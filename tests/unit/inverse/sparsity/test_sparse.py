@@ -16,7 +16,6 @@ from creepkit.inverse.sparsity.term_selection import (
     TermContributions,
     contribution_norm,
     identify_sparse,
-    switchable_exponents,
 )
 from creepkit.language import arrhenius
 from creepkit.laws.combined import COMBINED
@@ -83,12 +82,6 @@ def test_the_norm_is_what_least_squares_see_with_the_derivatives_of_a_closed_for
     found = norm(x)[1][:, [law.names.index("A_1"), law.names.index("A_2")]]
     assert found == pytest.approx(np.sqrt(2 * L2_STRENGTH) * wanted, abs=1e-6)
     assert (norm(x)[1][:, -1] == 0).all()
-
-
-def test_exponents_that_can_be_off_are_those_of_memory():
-    """n of 1 to 8 has {0} outside its bounds; m of -1 to 0 can get there."""
-    assert [COMBINED.names[k] for k, _ in switchable_exponents(COMBINED)] == ["m_1", "m_2"]
-    assert switchable_exponents(NORTON) == []
 
 
 # ---- sparse ----------------------------------------------------------------------------------------------------------
