@@ -157,7 +157,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
     "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
     "label operator": ("prüfer", "tester"),
-    "label elongation_pct": ("rupture elongation", "elongation at rupture", "bruchdehnung", "allongement à rupture"),
+    "label elongation_pct": (
+        *("rupture elongation", "elongation at rupture", "bruchdehnung", "bruchdehnung a", "zeitbruchdehnung"),
+        *("allongement à rupture",),
+    ),
     "label reduction_of_area_pct": (
         *("reduction of area", "area reduction", "reduction in area", "brucheinschnürung", "einschnürung", "striction"),
         *("striction à rupture",),
@@ -210,7 +213,7 @@ _PARTS_OF_UNIT = 8
 
 
 _RATE_UNIT = re.compile(
-    r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+|(?:1000|10\^?3) ?h)(\^?[({]?-1[)}]?)?"
+    r"(1|-|%|pct|percent|mm/mm|m/m|)\s*(?:(/|per )\s*)?([a-z]+|(?:1000|10\^?3) ?h(?:rs?|ours)?)(\^?[({]?-1[)}]?)?"
 )
 _ON_THE_LINE = str.maketrans("⁻⁰¹²³⁶·*", "-01236  ")
 """Exponents and products in a unit as they are typed."""
