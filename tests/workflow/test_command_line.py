@@ -95,7 +95,7 @@ def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):
     words = ("--law", "norton", "--law", "hyperbolic-sine", "--further-tests", "--starts", 1, "--no-sums")
     result = creepkit("identify", *CURVES[:3], *words, "--to", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert "BIC - best" in result.stdout
+    assert "behind  weight" in result.stdout
 
 
 # ---- study commands --------------------------------------------------------------------------------------------------

@@ -124,6 +124,8 @@ class TestTable:
         if self.is_understood:
             self._fill_stated()
             self._fill_groups()
+            if vocabulary.ignored:
+                self._leave_out_silent_rows()
 
     @property
     def place(self) -> str:
@@ -418,6 +420,24 @@ class TestTable:
         number = float(plain) if is_number(plain, Dialect()) else likely
         what = f"the cell of '{quoted(name, 60)}' is empty{others}; which {quantity} is it?"
         return self.question(what, f"{quantity}_{unit}", (number,), line=self.rows[missing[0]].line, is_free=True)
+
+    def _leave_out_silent_rows(self) -> None:
+        """Leave out rows that state no result once columns are left out, which its assumptions name."""
+        results = ("minimum_rate", "rupture", "end_time")
+        says = [k for k, one in enumerate(self.columns) if one.quantity in results or one.strain is not None]
+        silent = [all(is_missing(row.cells[k]) for k in says) for row in self.rows]
+        if silent and all(silent):
+            raise HistoryError(
+                f"{self.place}: no row states a minimum creep rate or an end of its test once the ignored columns are "
+                "left out; keep one of these columns"
+            )
+        names = zip(self.names_of_tests(), self.rows, silent, strict=True)
+        called = [name or f"line {row.line}" for name, row, is_silent in names if is_silent]
+        if called:
+            more = f" and {len(called) - MOST_ASKED} more" if len(called) > MOST_ASKED else ""
+            listed = f"{' '.join(called[:MOST_ASKED])}{more}"
+            self.table = self.table.assuming(f"without {listed} (nothing but ignored columns)")
+            self.rows = [row for row, is_silent in zip(self.rows, silent, strict=True) if not is_silent]
 
 
 _OF_TREATMENT = re.compile(

@@ -12,14 +12,14 @@ labels. All errors of a file come at once.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import is_missing
+from creepkit.files.delimited_text import float_of, is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
     TestColumn,
@@ -34,6 +34,7 @@ from creepkit.readers.ends_of_tests import (
     LABEL,
     RUPTURED,
     STOPPED,
+    TIME_IN_CELL,
     UNCLEAR,
     EndsOfColumn,
     MarkedTime,
@@ -327,7 +328,7 @@ def ends_of_rows(table: TestTable) -> list[RowEnd]:
     if time is not None and not any(STOPPED in (end.stated, end.mark.said) for end in ends):
         table.errors += _asked_of_notes(table, answers)
     if time is not None or duration is not None:
-        table.errors += [_asked_of_column(table, k, one) for k, one in found.items() if one.asked]
+        table.errors += [_asked_of_column(table, k, one, time) for k, one in found.items() if one.asked]
     if time is not None:
         open_rows = [r for r, end in enumerate(ends) if end.mark.said == UNCLEAR and end.stated == ""]
         table.errors += _asked_of_marks(table, time, {marks[r].mark: table.rows[r] for r in reversed(open_rows)})
@@ -350,7 +351,7 @@ def _asked_of_notes(table: TestTable, answers: Mapping[str, str]) -> list[Histor
     ]
 
 
-def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn) -> Question:
+def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn, time: int | None) -> Question:
     """The question of what the texts of a column say of the end."""
     first = column.ends.index(UNCLEAR)
     texts = list(column.asked[:MOST_ASKED])
@@ -359,7 +360,9 @@ def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn) -> Question
     flags = [text for text in texts if text]
     choices = [dict.fromkeys(texts, end) for end in (STOPPED, RUPTURED)]
     if len(flags) == 2 and len(column.values) == 2 and not column.is_remark:
-        choices = [dict(zip(flags, ends, strict=True)) for ends in ((STOPPED, RUPTURED), (RUPTURED, STOPPED))]
+        likely = _likely_unbroken(table, k, flags, time)
+        other = next(text for text in flags if text != likely)
+        choices = [{likely: STOPPED, other: RUPTURED}, {likely: RUPTURED, other: STOPPED}]
     return table.question(
         f"'{quoted(table.names[k], 60)}' says {listed}{more}: did these tests break, were they stopped before, or does "
         "it say nothing of their end?",
@@ -367,6 +370,18 @@ def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn) -> Question
         [*choices, dict.fromkeys(texts, LABEL)],
         line=table.rows[first].line,
     )
+
+
+def _likely_unbroken(table: TestTable, column: int, texts: Sequence[str], time: int | None) -> str:
+    """Which of two values tests have that did not break: those that share one time, else those that lasted longer."""
+
+    def rank(text: str) -> tuple[bool, float]:
+        rows = [row for row in table.rows if row.cells[column].casefold() == text.casefold()]
+        cells = [TIME_IN_CELL.fullmatch(row.cells[time]) for row in rows] if time is not None else []
+        times = [float_of(one["number"]) for one in cells if one and one["number"].count(".") < 2]
+        return len(times) > 1 and len(set(times)) == 1, sum(times) / max(len(times), 1)
+
+    return max(texts, key=rank)
 
 
 def _asked_of_marks(table: TestTable, time: int, marked: Mapping[str, TestRow]) -> list[HistoryError]:

@@ -101,7 +101,7 @@ def _before(location: str) -> str:
 TIME = QuantityKind("time", conversions("s", "min", "h", "d", "kh"), low=0.0)
 
 
-LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in", "mil"))
+LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in"))
 
 
 _NO_UNIT = {"": UnitConversion(1.0)}
