@@ -64,7 +64,7 @@ CAUTIONS = {
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {exponent}",
     # offsets or drifts would move rates
-    "not included": "intervals do not include {kinds}: rates move by {change}",
+    "not included": "intervals do not include {kinds} (independent from test to test): the law's rates move by {change}",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
@@ -120,7 +120,7 @@ NEXT = {
 
 
 BRACKETS = (
-    "In brackets: 95 % intervals; those of forecasts and lives hold one new test. "
+    "In brackets: 95 % intervals; those of forecasts and lives are for one new test. "
     "The mean misfit is over the tests that were fitted."
 )
 """Below the numbers of an answer."""
