@@ -64,7 +64,7 @@ CAUTIONS = {
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {exponent}",
     # offsets or drifts would move rates
-    "not included": "intervals do not include {kinds} (independent from test to test): the law's rates move by {change}",
+    "not included": "intervals do not include {kinds} (of each test by itself): rates of the law move by {change}",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
