@@ -408,9 +408,10 @@ def _reported(
     failed |= (prediction.status[0] != Status.RUPTURED) & [test.misses_readings for test in tests]
     unpredicted = tuple(h.name for h, is_failed in zip(histories, failed, strict=True) if is_failed)
     judge = Judge(problem, noise_model, estimator.predictor_errors, histories)
+    adequacy = judge.adequacy(judged)
     adequacy = replace(
-        judge.adequacy(judged),
-        remedies=judge.remedies(judged, unmodelled),
+        adequacy,
+        remedies=judge.remedies(judged, unmodelled) if adequacy.rejects else (),
         of_rates=rates.found,
         outlying=rates.outlying,
         implausible=implausible,

@@ -159,12 +159,10 @@ class Judge:
         )
 
     def remedies(self, linear: LinearisedProblem, effects: Sequence[Perturbation]) -> tuple[str, ...]:
-        """The effects with which the law would explain the tests that it does not without, as they would have to be.
+        """The effects with which a law that is rejected would explain the tests, as they would have to be.
 
         A drift in one test alone is a rate that changes with time, which a law may have: nothing tells the two apart.
         """
-        if not self.adequacy(linear).rejects:
-            return ()
         remedies = []
         for effect in effects:
             is_of_law = effect.common or (effect.kind == DRIFT and effect.tests == 1)

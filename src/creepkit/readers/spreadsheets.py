@@ -242,6 +242,10 @@ def _clock_text(elapsed: timedelta) -> str:
     return f"{hours}:{rest // 60:02d}:{rest % 60:02d}{f'.{part:06d}' if part else ''}"
 
 
+_SECTIONS = re.compile(r'(?:"[^"]*"?|\\.|[^;"\\])*', re.DOTALL)
+"""A section of a number format, up to a semicolon that is neither quoted nor escaped."""
+
+
 _LITERAL = re.compile(r'"([^"]*)"?|\\(.)|_.|\*.|\[[^\]]*\]?', re.DOTALL)
 """Parts of a format that are shown as they stand, the first two, and those of width, filling, colour and condition."""
 
@@ -255,9 +259,11 @@ def number_text(value: float, number_format: str) -> str:
     text = repr(value)
     if "%" not in number_format:
         return text
-    if "%" in _LITERAL.sub("", number_format):
+    sections = [one for one in _SECTIONS.findall(number_format) if one]
+    section = sections[min(1 if value < 0 else 2 if value == 0 and len(sections) > 2 else 0, len(sections) - 1)]
+    if "%" in _LITERAL.sub("", section):
         return f"{Decimal(text).scaleb(2).normalize():f}%"
-    shown = "".join((match[1] or match[2] or "") for match in _LITERAL.finditer(number_format))
+    shown = "".join((match[1] or match[2] or "") for match in _LITERAL.finditer(section))
     return f"{text}%" if shown.strip() == "%" else text
 
 
