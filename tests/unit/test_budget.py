@@ -37,7 +37,7 @@ BUDGET = {
     "laws": 136,
     "modules": 747,
     "quality": 1143,
-    "readers": 6493,
+    "readers": 6488,
     "records": 2393,
     "registry": 608,
     "reports": 5866,
