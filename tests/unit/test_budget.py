@@ -29,7 +29,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9781,
+    "inverse": 9791,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,

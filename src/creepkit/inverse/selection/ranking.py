@@ -282,8 +282,10 @@ def challenged(ranking: Ranking) -> Ranking:
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    _, weights = evidence_weights([ranked.excess for ranked in ranking.laws])
-    found = challenges_of(fits) if ranking.singled_out else explaining_effects(fits, weights)
+    if ranking.singled_out:
+        found = challenges_of([r.fit for r in ranking.laws if r.same_as != ranking.best.law.name])
+    else:
+        found = explaining_effects(fits, evidence_weights([ranked.excess for ranked in ranking.laws])[1])
     return replace(ranking, challenges=found)
 
 
