@@ -17,7 +17,8 @@ BUDGET = {
     "api": 285,
     "app": 596,
     "cameras": 823,
-    "cli": 2127,
+    "cli": 2135,
+    "composition": 372,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
@@ -40,10 +41,10 @@ BUDGET = {
     "readers": 6493,
     "records": 2393,
     "registry": 608,
-    "reports": 5866,
+    "reports": 6054,
     "rupture_assessment": 1825,
     "sampling": 960,
-    "screening": 545,
+    "screening": 572,
     "specimens": 3203,
     "studies": 2770,
     "surrogates": 1361,
@@ -51,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_000
+TESTS = 30_101
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

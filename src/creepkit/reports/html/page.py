@@ -31,6 +31,7 @@ from creepkit.reports.blocks import (
     sentence,
     typeset,
 )
+from creepkit.reports.composition import composition_blocks, map_sentence
 from creepkit.reports.description import rejected, tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
@@ -305,6 +306,11 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
             contents.imposed,
             lambda one, of: _imposed_blocks(one),
             lambda one: f"lag of the clocks {number(one.alignment.lag, 4)} s",
+        ),
+        "composition": (
+            *("Creep over compositions", contents.composition),
+            lambda one, of: composition_blocks(one, figures),
+            map_sentence,
         ),
         "temperature": (
             *("Trends with temperature", contents.temperature, temperature),
