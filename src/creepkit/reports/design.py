@@ -119,7 +119,7 @@ def design_blocks(design: Design, figures: PageFigures | None = None, of: str = 
         reasons.setdefault(kind_of_reason(reason), []).append(description)
     lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
     lines += design.notes[MOST_CAUTIONS:] if design.tests else ()
-    return [*blocks, Items(lines)] if lines else blocks
+    return [*blocks, Items(lines)]
 
 
 def _table(design: Design) -> Table:
@@ -139,7 +139,7 @@ def _table(design: Design) -> Table:
         rows.append((test.description, f"{test.hours:.3g}", *nats, *told))
     caption = ORDER_BY_LAW if design.goal == "law" else ORDER
     columns = ("planned test", "machine time, h", "nats", "nats / h", *heads)
-    return Table(caption, columns, rows, numeric=range(1, len(columns)))
+    return Table(caption, columns, rows)
 
 
 ORDER = "the best tests, by the expected information for each hour of machine time; by a nat 2.7 times as much is known"

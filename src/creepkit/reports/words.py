@@ -8,15 +8,15 @@ from __future__ import annotations
 
 HEADLINES = {
     # everything that was measured is predicted within a factor of 2
-    "use": "use {law} for {good}; {truth}",
+    "use": "use {law}: on average it fits {good}; {truth}",
     # some of it is, some is not
-    "use in part": "use {law} for {good}, not {bad}; {truth}",
+    "use in part": "use {law} in part: on average it fits {good}, but misses {bad}; {truth}",
     # everything is, but the tests reject the law
-    "between": "use {law} between the tests only, for {good}; {truth}",
+    "between": "use {law} between the tests only: on average it fits {good}; {truth}",
     # some is, and they reject it
-    "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
+    "between in part": "use {law} between the tests only: on average it fits {good}, but misses {bad}; {truth}",
     # nothing is
-    "use nothing": "do not use {law}: it misses {bad}; {truth}",
+    "use nothing": "do not use {law}: on average it misses {bad}; {truth}",
     # nothing can be compared, as of fields alone
     "fitted": "{law} was fitted; {truth}",
     # the search did not converge
@@ -25,15 +25,19 @@ HEADLINES = {
 """{kind: the first line of an answer}."""
 
 
+FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
+"""What was measured, with the root mean square of predicted over measured in the fitted tests."""
+
+
 TRUTHS = {
     # no noise is stated, and too few readings show it
-    "not judged": "whether it is true is unknown",
+    "not judged": "whether it is the exact law cannot be judged",
     # the p-value is 0.3 % or more
     "explains": "the tests do not reject it",
     # what it misses lies in single tests, or in two groups of them (their sentence follows)
     "in tests": "{cause}",
     # any other misfit beyond the noise; why stands in the first caution
-    "rejected": "the tests reject it",
+    "rejected": "the tests reject it as the exact law",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
@@ -46,7 +50,7 @@ CAUTIONS = {
     # an answer from a file says nothing of it
     "unknown": "whether the tests reject the law is not known",
     # they do; why follows, the first of REASONS that holds
-    "rejected": "the tests reject it as the exact law: {reason}",
+    "rejected": "it is not exact: {reason}",
     # a simulation ends before a reading, or gives no number
     "unpredicted": "it does not predict every reading of {tests}",
     # a thickness, offset or drift of usual size takes the rejection away
@@ -102,7 +106,7 @@ NEXT = {
     # laws have weights of 0.05 or more, and bars can tell them apart
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     # bars cannot
-    "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "separate otherwise": "make a test that tells {first} from {second} (creepkit design)",
     # the law above a threshold stress explains the tests as well
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
@@ -120,10 +124,14 @@ NEXT = {
 
 
 BRACKETS = (
-    "In brackets: 95 % intervals; those of forecasts and lives are for one new test. "
-    "The mean misfit is over the tests that were fitted."
+    "In brackets: 95 % intervals, of what one new test may show where this is said. "
+    "The misfit of the headline is the mean of the fitted tests, not that of a forecast."
 )
 """Below the numbers of an answer."""
+
+
+NEW_TEST = "{condition}, one new test"
+"""Where a number holds whose interval has the scatter between tests in it."""
 
 
 ALL_DIGITS = "all digits{more}: details"
