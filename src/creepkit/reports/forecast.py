@@ -119,8 +119,8 @@ def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
 
 
 def _misfit_text(misfit: LawMisfit) -> str:
-    factor = f"{math.exp(abs(misfit.log_factor)):.3g}"
-    return FORECAST["misses"].format(factor=factor, here=f"{misfit.factor:.3g}")
+    factor, here = f"{math.exp(abs(misfit.log_factor)):.3g}", f"{misfit.factor:.3g}"
+    return FORECAST["misses"].format(factor=factor, allowed=FORECAST["allowed"].format(here=here) * (here != "1"))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:

@@ -144,7 +144,9 @@ def _draw_leading(
     if bar and np.ptp(scale.values) > 0:
         scale.add_bar(axes)
     if labelled:
-        _label_curves(axes, [f"{level:.3g}" for level in levels[tests]], [scale.colours[k] for k in tests])
+        _label_curves(
+            axes, [f"{level:.{2 + (unit == 'MPa')}g}" for level in levels[tests]], [scale.colours[k] for k in tests]
+        )
 
 
 def _label_curves(axes: Axes, labels: Sequence[str], colours: Sequence[Any]) -> None:
@@ -163,12 +165,12 @@ def _label_curves(axes: Axes, labels: Sequence[str], colours: Sequence[Any]) -> 
         heights = np.interp(every, points[:, 0], points[:, 1], left=np.nan, right=np.nan)
         curve = np.column_stack([every, heights])
         curves.append(curve[(curve[:, 1] >= bottom) & (curve[:, 1] <= top)])
+    drawn = np.concatenate(curves)
     for label, colour, curve in zip(labels, colours, curves, strict=True):
-        others = np.concatenate([one for one in curves if one is not curve] + [np.zeros((0, 2))])
         best, clearest = None, 0.0
         for anchor in curve[::-LABEL_STEP]:
             for corner in anchor + LABEL_PLACES:
-                beside = np.maximum(np.maximum(corner - others, others - corner - LABEL_SIZE), 0.0)
+                beside = np.maximum(np.maximum(corner - drawn, drawn - corner - LABEL_SIZE), 0.0)
                 clear = min(float(np.hypot(*beside.T).min(initial=LABEL_CLEAR)), LABEL_CLEAR)
                 free = all((abs(corner - one) > LABEL_SIZE).any() for one in taken)
                 if free and clear > clearest and corner[0] > left and corner[1] + LABEL_SIZE[1] < top:

@@ -211,7 +211,9 @@ FORECAST = {
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a rejected law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals allow for {here} here",
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}{allowed}",
+    # its end, where that is more than nothing
+    "allowed": "; intervals allow for {here} here",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
@@ -238,7 +240,9 @@ DESIGN = {
     # as it says
     "one law": "no test is proposed: {law} remains alone, and nothing is to be told apart from it",
     # all are left out
-    "none": "no test can be made: there are only candidates {reasons}",
+    "none": "no test can be made within these limits: of {count} candidates {reasons}",
+    # there are no candidates
+    "nothing": "no test can be made: none lies within the loads, durations and temperatures that were stated",
     # the goal is the law
     "decides": "it decides between the laws with probability {probability}",
     # a quantity
@@ -257,7 +261,13 @@ DESIGN = {
     "next contradicted": "find a law that the tests do not reject, or design for the values (--goal parameters)",
     # none is
     "next one law": "design for the values, or for a rate or an exponent (--goal parameters, rate, exponent)",
-    # none can be made
+    # none can be made, most would rupture
+    "next would rupture": "allow lower loads, shorter or colder tests (--levels, --longest-h, --temperature-c)",
+    # so they would
+    "next would grow too far": "allow lower loads or shorter tests (--levels, --longest-h)",
+    # their outputs stay within the noise
+    "next would hardly grow": "allow higher loads, longer or hotter tests (--levels, --longest-h, --temperature-c)",
+    # there are no candidates
     "next none": "state what the rig can do: loads, durations, temperatures (creepkit design --help)",
 }
 """{kind: what a design of further tests says}, its first line, what it tells, and what to do next."""
