@@ -48,8 +48,8 @@ def map_sentence(mapped: CompositionMap) -> str:
     )
 
 
-def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = None) -> list[Block]:
-    """The same as blocks; figures : of a page, where the picture is wanted."""
+def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The same as blocks; figures : of a page, where the picture is wanted. of : whose, in its captions."""
     rate, exponent, point = mapped.log_rate, mapped.stress_exponent, mapped.point
     at = f"{point['stress']:.3g} MPa, {celsius_text(point['temperature'])} and {100 * point['strain']:.2g} % strain"
     noise = float(np.sqrt(np.mean(rate.sd**2)))
@@ -61,7 +61,7 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
         f"in short, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
     ]
     lines += [f"left out: {name}: {why}" for name, why in mapped.left_out.items()]
-    title = "Creep rate over compositions"
+    title = f"Creep rate over compositions{of}"
     description = f"{title}: a triangle of the elements that vary most, and alloys left out over their own rates."
     return [
         *([] if figures is None else [figures.picture(lambda: composition_figure(mapped), title, description, title)]),
