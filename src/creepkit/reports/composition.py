@@ -98,7 +98,7 @@ def _shared_table(mapped: CompositionMap) -> Table:
         "law by its tests",
         "law with the others",
     )
-    return Table("the alloys that the others change most", columns, rows, numeric=(1, 2, 3))
+    return Table("the alloys that the others change most", columns, rows)
 
 
 def proposals_table(proposals: Sequence[PredictedAlloy], caption: str) -> Table:
@@ -109,7 +109,7 @@ def proposals_table(proposals: Sequence[PredictedAlloy], caption: str) -> Table:
         value, low, high = (number(PERCENT_PER_HOUR * rate, 2) for rate in one.rate)
         law, share = max(one.laws.items(), key=lambda pair: pair[1])
         rows.append((contents, f"{value} [{low}, {high}]", f"{one.stress_exponent[0]:.2g}", f"{law} ({share:.2f})"))
-    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", "law"), rows, numeric=(1, 2))
+    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", "law"), rows)
 
 
 def composition_figure(mapped: CompositionMap) -> Figure:
