@@ -97,7 +97,7 @@ def main():
             counts["contradicted"] += adequacy.rejects
             outcome = "named" if named(fault, concerned, found) else "other" if found else "nothing"
             counts[outcome] += 1
-            said = found[0].sentence if found else "nothing"
+            said = str(found[0]) if found else "nothing"
             progress(f"{fault} {number + 1}: {outcome}: planted {sorted(concerned)}; {said}")
         low, high = binomial_interval(counts["named"], options.campaigns)
         share = f"{counts['named']} ({counts['named'] / options.campaigns:.2f} [{low:.2f}, {high:.2f}])"

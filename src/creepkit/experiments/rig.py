@@ -354,17 +354,16 @@ def _loadings(rig: Rig, base: History, duration: float) -> Iterator[tuple[Loadin
     Each in words, which the description of the test goes on with.
     """
     quantity, change = base.loading.quantity, CHANGE_AT * duration
-    unit = "" if quantity == "strain" else f" {load_unit(base)}".rstrip()
+    factor, unit = (100.0, " % strain") if quantity == "strain" else (1.0, f" {load_unit(base)}".rstrip())
     ramp = None if quantity == "stress" else min(_ramp_of(base), 0.1 * duration)
 
     def made(value: float | TwoLevels, end: float) -> Loading:
         return loading_of(quantity, value, control=held_of(base.loading), ramp=ramp, end=end)
 
-    prefix = "a strain of " if quantity == "strain" else ""
     for level in _levels(rig):
-        yield made(level, 0.5 * duration), f"{prefix}{level:.3g}{unit} for"
+        yield made(level, 0.5 * duration), f"{factor * level:.3g}{unit} for"
     for first, second in _pairs(rig):
-        text = f"{prefix}{first:.3g}{unit} to {time_text(change)}, then {second:.3g}{unit} to"
+        text = f"{factor * first:.3g}{unit} to {time_text(change)}, then {factor * second:.3g}{unit} to"
         yield made(TwoLevels(first, second, change), duration), text
 
 

@@ -8,17 +8,11 @@ from typing import Literal
 import numpy as np
 
 from creepkit.inverse.explanation import VERDICT_ODDS, Explanation
-from creepkit.inverse.known_noise import how_to_state_noise
 from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
 from creepkit.inverse.single_values import ContradictingValues
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, SMALLEST_RATE_SCATTER
 from creepkit.limits import SIGNIFICANCE
-from creepkit.records import is_logarithmic, output_unit
-from creepkit.records.units import time_text
-
-IMPLAUSIBLE_CHI_SQUARE = 0.05
-"""Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
-
+from creepkit.records.presentable import Presentable
 
 SHAPE_MISFIT = 5.0
 """Noises that a law leaves of an output, from which on it misses the shape of curves, and its rates are doubtful."""
@@ -26,14 +20,6 @@ SHAPE_MISFIT = 5.0
 
 UNDETECTED_SCATTER = 1.5 * SMALLEST_RATE_SCATTER
 """Of ln rate between tests: an estimate that is not above is at its lower bound."""
-
-
-NOTEWORTHY_EXPECTATION = 1.05
-"""Mean reduced chi-square of a right law from which on it is said beside the one that was found."""
-
-
-SMALLEST_SHOWN_P_VALUE = 1e-12
-"""p-values below are shown as such."""
 
 
 AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
@@ -79,23 +65,9 @@ class LargestDeviation:
     noises: float
     rms: float = 0.0
 
-    def __str__(self) -> str:
-        side = "above" if self.deviation > 0 else "below"
-        rms = f" (rms {_amount(self.rms, self.output)})" if self.rms > 0 else ""
-        return (
-            f"{self.output} of '{self.test}'{rms} about {time_text(self.time)}, where it lies "
-            f"{_amount(abs(self.deviation), self.output)} {side} what was measured"
-        )
-
-
-def _amount(value: float, output: str) -> str:
-    """So much of an output, strains in per cent."""
-    percent = is_logarithmic(output)
-    return f"{(100.0 if percent else 1.0) * value:.2g} {'%' if percent else output_unit(output)}".strip()
-
 
 @dataclass(frozen=True)
-class Adequacy:
+class Adequacy(Presentable):
     """What was found of whether a law explains the tests to their noise; `verdict` follows from it.
 
     outputs : one by one; those without known noise are missing. chi_square : of all of them, over `freedom`, its
@@ -190,19 +162,6 @@ class Adequacy:
         """Whether rates of tests are what the law misses, and not the shape of their curves."""
         return bool(self.explanations) and not self.discrepancy_in_noises > SHAPE_MISFIT
 
-    @property
-    def explanation_text(self) -> str:
-        """The likeliest explanation of the rates of tests, those of other tests, and by how much it beats the next."""
-        if not self.explanations:
-            return ""
-        first, *rivals = self.explanations
-        sentence = first.sentence
-        if not rivals:
-            return sentence
-        ahead = first.odds - rivals[0].odds
-        said = f"{odds_text(ahead)} less likely" if ahead > np.log(3.0) else "about as likely"
-        return f"{sentence}; {said}: {rivals[0].headline}"
-
     def judges(self, output: str) -> bool:
         """Whether the noise of an output is known well enough to judge a law by."""
         return any(one.output == output for one in self.outputs)
@@ -218,15 +177,6 @@ class Adequacy:
         return self.explains and not self.implausible
 
     @property
-    def qualification(self) -> str:
-        """What follows "not rejected" where it takes nuisances of implausible size; "" where it does not."""
-        if not self.implausible:
-            return ""
-        more = len(self.implausible) - 1
-        others = f" (and {more} more such nuisance{'s' * (more > 1)})" if more else ""
-        return f", but only with {self.implausible[0].description}{others}"
-
-    @property
     def discrepancy_in_noises(self) -> float:
         """The largest discrepancy of an output, over its noise."""
         return max((o.discrepancy_in_noises for o in self.outputs), default=float("nan"))
@@ -235,108 +185,10 @@ class Adequacy:
         """Whether the law misses the shape of curves, by more noises than so many times SHAPE_MISFIT."""
         return self.rejects and self.discrepancy_in_noises > by * SHAPE_MISFIT
 
-    @property
-    def _chi_square_text(self) -> str:
-        remarks = []
-        if self.critical_chi_square > 0:
-            remarks.append(f"critical value {self.critical_chi_square:.3g}")
-        if self.expected_chi_square > NOTEWORTHY_EXPECTATION:
-            remarks.append(
-                f"expected {self.expected_chi_square:.3g} for a correct law, as the noise itself is estimated"
-            )
-        said = f" ({'; '.join(remarks)})" if remarks else ""
-        return f"reduced chi-square {self.chi_square:.3g} with {self.freedom:.0f} degrees of freedom{said}"
-
-    @property
-    def _p_value_text(self) -> str:
-        """The p-value; where it is the least of several times their number, how many and that one itself."""
-        count = len(self.outputs) + 1
-        if count == 2:
-            return p_value_text(self.p_value)
-        smallest = "" if np.isnan(self.smallest_p_value) else f"smallest {p_value_text(self.smallest_p_value)}, "
-        return f"{smallest}{p_value_text(self.p_value)} adjusted for {count} comparisons (Bonferroni)"
-
-    @property
-    def verdict_text(self) -> str:
-        """The verdict in few words, with the p-value, or what is left in noises; "?" where nothing can be judged."""
-        if self.verdict == "cannot be judged":
-            return "?"
-        if self.explains:
-            large = f", but only with a large {self.implausible[0].kind}" if self.implausible else ""
-            return f"not rejected ({p_value_text(self.p_value)}){large}"
-        if self.contradicting is not None:
-            return "rejected: rates contradict rupture times"
-        noises = self.discrepancy_in_noises
-        if self.explanations and (self.lies_in_tests or not noises > 0):
-            return f"rejected: {self.explanations[0].headline}"
-        left = f"leaves {noises_text(noises)} noises" if noises > 0 else "rates of tests are not followed"
-        return f"rejected: {left}"
-
     def __getitem__(self, output: str) -> OutputAdequacy:
         for one in self.outputs:
             if one.output == output:
                 return one
         raise KeyError(output)
 
-    def __str__(self) -> str:
-        """One sentence, to follow "the law": the verdict, with what is left and where."""
-        if self.unpredicted and self.verdict == "cannot be judged":
-            more = f" and {len(self.unpredicted) - 1} more" if len(self.unpredicted) > 1 else ""
-            return f"cannot be judged: it does not predict every reading of test '{self.unpredicted[0]}'{more}"
-        if self.verdict == "cannot be judged":
-            return f"cannot be judged: {how_to_state_noise(self.not_judged, self.few_frames)}"
-        source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
-        if self.explains:
-            slow = np.isfinite(self.correlation)
-            correlated = "; what is left is autocorrelated, noise or the law's own" if slow else ""
-            scatter = f" ({rate_scatter_text(self.rate_scatter)})" if self.rate_scatter > 0 else ""
-            if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
-                scatter += " (far larger than what the readings show: check its unit)"
-            found = f"{self._chi_square_text}, {self._p_value_text}{correlated}"
-            return f"is not rejected by the tests at their {source} noise{self.qualification}{scatter}: {found}"
-        if self.contradicting is not None and not self.outputs:
-            return f"is rejected by the tests: {self.contradicting}"
-        parts = [
-            f"{_amount(o.discrepancy, o.output)} of {o.output} ({noises_text(o.discrepancy_in_noises)} times its "
-            f"{o.noise_source} noise)"
-            for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
-            if o.discrepancy > 0
-        ]
-        if (self.scatters_too_much or (self.remedies and not parts)) and not self.explanations:
-            parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
-        if self.contradicting is not None:
-            parts.append(str(self.contradicting))
-        where = f". Most in {self.largest}" if self.largest is not None else ""
-        if self.remedies and not self.explanations:
-            where += f". It would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
-        if self.explanations and not parts:
-            curves = f"; curves agree with the noise ({self._p_value_text})" if self.outputs else ""
-            return f"is rejected by the rates of the tests: {self.explanation_text}{curves}"
-        judged = f"{self._chi_square_text}, {self._p_value_text}"
-        rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained: {judged}{where}"
-        beside = "" if self.is_explained else "of its rates, "
-        return f"{rest}; {beside}{self.explanation_text}" if self.explanations else rest
-
-
-def p_value_text(p: float) -> str:
-    """A probability as "p = 0.028"."""
-    if p <= SMALLEST_SHOWN_P_VALUE:
-        return f"p < {SMALLEST_SHOWN_P_VALUE:g}"
-    return f"p = {p:.{2 if p >= 1e-3 else 1}g}"
-
-
-def noises_text(noises: float) -> str:
-    """Multiples of a noise to two digits, without a power of ten."""
-    return f"{float(f'{noises:.2g}'):g}" if np.isfinite(noises) and noises < 1e5 else f"{noises:.2g}"
-
-
-def odds_text(log_odds: float) -> str:
-    """Odds as a factor: "30 times"; log_odds : their ln."""
-    return f"{float(f'{np.exp(min(log_odds, 13.8)):.1g}'):,.0f} times" + (" or more" if log_odds > 13.8 else "")
-
-
-def rate_scatter_text(scatter: float) -> str:
-    """What was found of the scatter of rates between tests; scatter : of ln rate, one standard deviation."""
-    if scatter <= UNDETECTED_SCATTER:
-        return "no scatter of rates between tests was detected"
-    return f"rates of tests scatter by {100 * scatter:.2g} %"
+    shown_by = "verdicts.adequacy_text"

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.observation_vector import SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.reference_conditions import frame_noise, usable_frames
 from creepkit.records import History
 
@@ -25,10 +25,6 @@ LEAST_NOISE_FREEDOM = 6.0
 
 FEWEST_HALF_FRAMES, NOTEWORTHY_GROWTH = 15, 1.4
 """Frames of half a test whose noise can be estimated, and the growth of noise and output from which it is compared."""
-
-
-MOST_NAMED_TESTS = 4
-"""Tests with too few frames that a sentence names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,27 +150,3 @@ def _variance_of_f(freedom: float, noise_freedom: float) -> float:
 def _distribution_of_reduced(freedom: float, noise_freedom: float) -> tuple[Any, float]:
     """A distribution of scipy, and a scale of it: chi-square over its degrees of freedom, or F."""
     return (chi2(freedom), 1.0 / freedom) if np.isinf(noise_freedom) else (f(freedom, noise_freedom), 1.0)
-
-
-def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, int]] = ()) -> str:
-    """Why nothing was known of the noise of these outputs, and where to state it.
-
-    few_frames : tests that have too few frames to show it, each with how many.
-    """
-    frames = [name for name in outputs if name not in SINGLE_VALUES]
-    if frames or not outputs:
-        column = f"{frames[0] if frames else 'strain'}_sd"
-        named = ", ".join(f"'{name}' ({count})" for name, count in few_frames[:MOST_NAMED_TESTS])
-        more = len(few_frames) - MOST_NAMED_TESTS
-        tests = f" of {named}{f' and {more} more tests' if more > 0 else ''}" if few_frames else ""
-        return (
-            f"no noise is stated, and too few readings{tests} show it: noise that is estimated from fewer than "
-            f"{LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME:.0f} readings of a test cannot judge whether a law explains it "
-            f"(state it in a column such as {column}, in Python as standard_deviation)"
-        )
-    if MINIMUM_RATE_OUTPUT in outputs:
-        return (
-            "no noise of the minimum rates is stated, and scatter between tests was estimated from them. State it in a "
-            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd"
-        )
-    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"

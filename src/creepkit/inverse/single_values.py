@@ -31,6 +31,7 @@ from creepkit.inverse.uncertainty.mixture_distribution import NORMAL_FREEDOM, Mi
 from creepkit.inverse.uncertainty.rate_scatter import RateScatter
 from creepkit.limits import SIGNIFICANCE
 from creepkit.records import History, Predictor, constant_stress
+from creepkit.records.presentable import Presentable
 
 if TYPE_CHECKING:
     from creepkit.inverse.uncertainty.law_misfit import LawMisfit
@@ -41,12 +42,6 @@ own horizon comes on top."""
 
 FEWEST_VALUES = 5
 """Tests that are judged; and as many as the regression has columns, and three more."""
-
-NOTEWORTHY_RATIO = 1.25
-"""Of the means of predicted over measured: less is said to be a trend."""
-
-SMALLEST_P_VALUE = 1e-12
-"""That is shown."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +207,7 @@ def constant_stress_tests(
 
 
 @dataclass(frozen=True)
-class ContradictingValues:
+class ContradictingValues(Presentable):
     """What a law cannot explain together.
 
     tests : how many are judged. rate_ratio, time_ratio : geometric means of predicted over measured minimum rates and
@@ -226,16 +221,7 @@ class ContradictingValues:
     scatter: float
     p_value: float
 
-    def __str__(self) -> str:
-        chance = f"p < {SMALLEST_P_VALUE:g}" if self.p_value < SMALLEST_P_VALUE else f"p = {self.p_value:.1g}"
-        judged = f"{self.tests} tests that scatter by a factor of {self.scatter:.3g}, {chance}"
-        means = f"{self.rate_ratio:.2g} of minimum rates and {self.time_ratio:.2g} of rupture times"
-        product = abs(np.log(self.rate_ratio * self.time_ratio))
-        trend = "" if product > np.log(NOTEWORTHY_RATIO) else ", and their ratio changes with stress or temperature"
-        return (
-            "minimum creep rates and rupture times contradict one another by this law: predicted over measured is "
-            f"{means} in the mean{trend} ({judged})"
-        )
+    shown_by = "verdicts.contradiction_text"
 
 
 def contradicting_values(

@@ -368,26 +368,25 @@ RAMPED = 0.05
 
 
 def loading_text(loading: Loading, unit: str = "MPa") -> str:
-    """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'.
+    """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', '0.2 % strain', '11 100 MPa, 12 40 MPa'.
 
     unit : of the load.
     """
     if isinstance(loading, PointLoading):
         parts = [f"{name} {_levels_text(p)} MPa" for name, p in loading.stress.items()]
         return ", ".join(parts + [f"strain {name} {_levels_text(p)}" for name, p in loading.strain.items()])
-    program = loading.program()
-    if not unit:
-        return f"{loading.quantity} {_levels_text(program)}"
-    return f"{_levels_text(program)} {unit}"
+    if loading.quantity == "strain":
+        return f"{_levels_text(loading.program(), 100.0)} % strain"
+    return f"{_levels_text(loading.program())} {unit}"
 
 
-def _levels_text(program: Program) -> str:
+def _levels_text(program: Program, factor: float = 1.0) -> str:
     held, values = _held_levels(program), program.values
     if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
-        return " to ".join(f"{level:g}" for level in held)
+        return " to ".join(f"{factor * level:.6g}" for level in held)
     if values[0] <= RAMPED * values.max() > 0.0:  # a load that was recorded from its ramp on
-        return f"{values[-1] if values[-1] > 0.5 * values.max() else values.max():.4g}"
-    return f"{values[0]:g} to {values[-1]:g}"
+        return f"{factor * (values[-1] if values[-1] > 0.5 * values.max() else values.max()):.4g}"
+    return f"{factor * values[0]:.6g} to {factor * values[-1]:.6g}"
 
 
 def _held_levels(program: Program) -> list[float]:

@@ -24,11 +24,24 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
-from creepkit.reports.blocks import MOST_NAMED, Answer, Rich, Table, as_text, listed, named, number, plural, printable
-from creepkit.reports.description import rejected, tested_range, tests_text
+from creepkit.reports.blocks import (
+    MOST_NAMED,
+    Answer,
+    Cell,
+    Rich,
+    Table,
+    as_text,
+    listed,
+    named,
+    number,
+    plural,
+    printable,
+)
+from creepkit.reports.description import headline_role, rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, REASONS
+from creepkit.reports.verdicts import cause_caution, cause_headline, same_functions, unmet_text, verdict_text
+from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, NEW_TEST, REASONS
 
 if TYPE_CHECKING:
     from creepkit.forecasts.forecast import Forecast
@@ -74,6 +87,10 @@ BEYOND = {"h": "later", "%": "ruptured"}
 """{unit: what an interval without an upper end says}, of times and of strains."""
 
 
+SLOPES = "stress exponent", "activation energy"
+"""Names of slopes, which are positive, whatever a linear approximation says of the ends of their intervals."""
+
+
 @dataclass(frozen=True)
 class KeyFigure:
     """One number that a laboratory asks for.
@@ -98,8 +115,13 @@ class KeyFigure:
 
     @property
     def text(self) -> str:
-        """Value, interval and unit."""
-        return interval_text((self.value, self.low, self.high), self.unit)
+        """Value, interval and unit; of an exponent or energy whose interval is wider than itself the interval alone."""
+        said = interval_text((self.value, self.low, self.high), self.unit)
+        if not (self.name.endswith(SLOPES) and self.high - self.low > self.value):
+            return said
+        return (
+            f"{NOT_DETERMINED} [{number(max(self.low, 0.0), 2)}, {number(self.high, 2)}]{self.unit and ' '}{self.unit}"
+        )
 
 
 def _written_out(value: float, digits: int) -> str:
@@ -149,7 +171,8 @@ def _lives(fit: Identification) -> list[KeyFigure]:
     end, test = max(broken, key=lambda pair: pair[0].measured)
     said = f"measured {_written_out(end.measured / SECONDS_PER_HOUR, 3)} h"
     hours = [time / SECONDS_PER_HOUR for time in (end.predicted, end.low, end.high)]
-    return [_with_interval("time to rupture", test.condition, hours, unit="h", remark=said)]
+    where = NEW_TEST.format(condition=test.condition)
+    return [_with_interval("time to rupture", where, hours, unit="h", remark=said)]
 
 
 def _with_interval(
@@ -181,6 +204,7 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     """times : to values are asked for."""
     condition = test.history.condition
     where, end = condition if test.name in condition else f"{test.name}: {condition}", float(test.history.times[-1])
+    where = where if test.inside is not None else NEW_TEST.format(condition=where)
     reached = [one for one in test.times if math.isfinite(one.median)]
     life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
     wanted = [*([one for one in reached if one.output] if times else ()), *life]
@@ -252,7 +276,9 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
 def _of_tests(fit: Identification) -> Iterator[str]:
     """Tests that do not agree with all others, with the error that would make it."""
     found = fit.adequacy.explanations[:1] if fit.adequacy is not None else ()
-    yield from (one.caution if one.kind == "one test" else one.headline for one in found if not one.is_of_law)
+    yield from (
+        cause_caution(one) if one.kind == "one test" else cause_headline(one) for one in found if not one.is_of_law
+    )
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
@@ -298,7 +324,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
     for k, reason in enumerate(_reasons(fit, adequacy)):
         yield reason if k else CAUTIONS["rejected"].format(reason=reason)
     if adequacy.mentioned is not None:
-        yield adequacy.mentioned.caution
+        yield cause_caution(adequacy.mentioned)
     if adequacy.remedies and not adequacy.explanations:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
     yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
@@ -312,7 +338,7 @@ def _reasons(fit: Identification, adequacy: Adequacy) -> list[str]:
         return []
     found = [REASONS["two exponents"]] * (adequacy.contradicting is not None)
     if adequacy.is_explained:
-        found.append(REASONS["cause"].format(cause=adequacy.explanations[0].headline))
+        found.append(REASONS["cause"].format(cause=cause_headline(adequacy.explanations[0])))
     if adequacy.misses_shape() and adequacy.largest is not None:
         worst = adequacy.largest
         factor, unit = (100.0, "% (absolute)") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
@@ -333,13 +359,13 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
     """What else the tests allow."""
     if ranking is None or len(ranking.laws) < 2 or ranking.adequacy is None:
         return
-    unmet, others = ranking.unmet, [one.fit.law.name for one in ranking.credible[1:]]
+    others = [one.fit.law.name for one in ranking.credible[1:]]
     if others:
         yield CAUTIONS["undecided"].format(laws=named(others, "law"))
     same = f"{ranking.best.law.name} above "  # a threshold
     yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
-        yield from (unmet[name] for name in ("weight", "challenges") if name in unmet)
+        yield from (unmet_text(ranking, name) for name in ("weight", "challenges") if name in ranking.unmet)
 
 
 def _precision(fit: Identification) -> Iterator[str]:
@@ -384,7 +410,7 @@ def answer(
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
-    remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), ranking.same_functions]
+    remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), same_functions(ranking)]
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
@@ -395,12 +421,13 @@ def answer(
         tests_text(fit),
         titled_law(fit.law),
         equations(fit.law),
-        [(symbols[e.name], f"{e.value:.4g}", interval_ends(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
+        [(symbols[e.name], *_shown_value(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
         [(one.name, one.where, one.text, one.remark) for one in figures],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
         next_step(fit, ranking, searched),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
+        role=headline_role(fit),
         units=f"{Answer.units}{other}",
         **page,
     )
@@ -418,17 +445,16 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
 
     groups : {name: (best law, whether its choice is decisive, None where it was not one)}.
     """
-    rows = []
+    rows: list[Sequence[Cell]] = []
     for name, (fit, decisive) in groups.items():
         figures = {one.name.removeprefix("measured "): one.text for one in key_figures(fit)}
-        said = "?" if fit.adequacy is None else fit.adequacy.verdict_text
-        rate = figures.get("creep rate", "–").replace(" %/h", "")
-        numbers = (figures.get("stress exponent", "–"), rate, number(fit.tested_point.stress, 3))
         choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
-        rows.append((name, titled_law(fit.law), *numbers, f"{said}{choice}"))
+        rate, stress = figures.get("creep rate", "–").replace(" %/h", ""), number(fit.tested_point.stress, 3)
+        numbers = (figures.get("stress exponent", "–"), rate, stress)
+        rows.append((name, titled_law(fit.law), *numbers, f"{verdict_text(fit.adequacy)}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
     caption = "in brackets: 95 % intervals; of a law that the tests reject the measured stress exponent, and no rate"
-    return Table(caption, columns, rows, numeric=(2, 3, 4))
+    return Table(caption, columns, rows)
 
 
 def chosen_text(ranking: Ranking) -> str:
@@ -464,9 +490,21 @@ def symbols_of(law: CreepLaw) -> dict[str, Rich]:
     return {str(symbol): Rich(str(symbol), expression_mathml(symbol)) for symbol in law.params}
 
 
-def value_cells(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
-    """A value with the digits that the law needs, and the ends of its 95 % interval, as every table shows them."""
-    return f"{estimate.value:.10g}", " to ".join(interval_ends(law, estimate))
+def _shown_value(law: CreepLaw, estimate: Estimate) -> tuple[str, tuple[str, str]]:
+    """A value and the ends of its interval, with the digits that this leaves, or that the tests do not determine it."""
+    fewest = FEWEST_DIGITS - (estimate.verdict in (NOT_DETERMINED, POORLY_DETERMINED))
+    digits = min(interval_digits(estimate.value, estimate.low, estimate.high, fewest=fewest), MOST_SHOWN)
+    said = NOT_DETERMINED if estimate.verdict == NOT_DETERMINED else f"= {number(estimate.value, digits)}"
+    return said, interval_ends(law, estimate, digits)
+
+
+def value_cells(law: CreepLaw, estimate: Estimate, held: str = "") -> dict[str, str]:
+    """A value with the digits that the law needs, the ends of its 95 % interval, and unit, as every table shows them.
+
+    held : what is said of the interval.
+    """
+    interval = " to ".join(interval_ends(law, estimate))
+    return {"value": f"{estimate.value:.10g}", f"95 % interval{held}": interval, "unit": unit_text(estimate.unit)}
 
 
 def unit_text(unit: str) -> str:
@@ -534,20 +572,20 @@ def interval_text(values: Sequence[float], unit: str = "") -> str:
     known = not (any(map(math.isnan, values[1:])) or math.isinf(values[1]))
     behind = f" {unit}" if unit and not math.isinf(values[0]) else ""
     digits = interval_digits(*values) if known else 2
-    value, low, high = (_written_out(v, digits) if not math.isinf(v) else BEYOND.get(unit, "no limit") for v in values)
-    return f"{value}{behind} [{low}, {high}]" if known else f"{value}{behind}"
+    value, *ends = (_written_out(v, digits) if not math.isinf(v) else BEYOND.get(unit, "no limit") for v in values)
+    return f"{value}{behind} [{', '.join(ends)}]" if known else f"{value}{behind}"
 
 
-FEWEST_DIGITS, MOST_DIGITS = 3, 7
-"""Of a value with its interval."""
+FEWEST_DIGITS, MOST_DIGITS, MOST_SHOWN = 3, 7, 4
+"""Of a value with its interval; and of values of a law on the first screen, whose other digits are in the details."""
 
 
-def interval_digits(value: float, low: float, high: float) -> int:
+def interval_digits(value: float, low: float, high: float, *, fewest: int = FEWEST_DIGITS) -> int:
     """Digits with which the ends of an interval differ from its value."""
     distances = [abs(end - value) for end in (low, high) if math.isfinite(end) and end != value]
     if not distances or value == 0.0 or not math.isfinite(value):
-        return FEWEST_DIGITS
-    return min(max(FEWEST_DIGITS, math.floor(math.log10(abs(value) / min(distances))) + 2), MOST_DIGITS)
+        return fewest
+    return min(max(fewest, math.floor(math.log10(abs(value) / min(distances))) + 2), MOST_DIGITS)
 
 
 def constant_load_sentence(fit: Identification) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from textwrap import TextWrapper, wrap
@@ -59,29 +59,42 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Items:
-    """A list of sentences."""
+    """A list of sentences below what they are, which says nothing where there are none."""
 
     kind: ClassVar[str] = "items"
     items: Sequence[str]
+    title: str = ""
+
+
+_NUMBERS = re.compile(r"([-+>\d.,%\[\]– ]|\de[-+]\d|to|inf|none|\+-|\(search bound\))*")
+"""A cell with numbers alone, with their intervals, or one that says that there is none."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table with a caption; the first cell of each row is its head. numeric : columns that stand right."""
+    """A table with a caption; the first cell of each row is its head."""
 
     kind: ClassVar[str] = "table"
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[Cell]]
-    numeric: Sequence[int] = ()
+
+    @classmethod
+    def of(cls, caption: str, rows: Sequence[Mapping[str, Cell]]) -> Table:
+        """Of rows {column: cell}, all with the same columns."""
+        return cls(caption, [*rows[0]] if rows else (), [[*row.values()] for row in rows])
+
+    @property
+    def numeric(self) -> list[int]:
+        """Columns of numbers, which stand right: not that of the heads of rows, unless it is one of numbers alone."""
+        columns = enumerate(zip(*self.rows, strict=True))
+        return [k for k, cells in columns if all(map(_NUMBERS.fullmatch, map(str, cells))) and any(map(str, cells))]
 
     @property
     def filled(self) -> Table:
         """The same without columns in which no cell says anything."""
         kept = [k for k in range(len(self.columns)) if k == 0 or any(str(row[k]) not in ("", "–") for row in self.rows)]
-        rows = [[row[k] for k in kept] for row in self.rows]
-        numeric = [place for place, k in enumerate(kept) if k in self.numeric]
-        return Table(self.caption, [self.columns[k] for k in kept], rows, numeric)
+        return Table(self.caption, [self.columns[k] for k in kept], [[row[k] for k in kept] for row in self.rows])
 
     def folded(self, width: int) -> Table:
         """The same with the last column on several lines where it would go beyond a width, or LEAST_FOLDED."""
@@ -91,7 +104,7 @@ class Table:
             first, *more = wrap(str(row[-1]), room) or [""]
             rows.append([*row[:-1], first])
             rows += [[*[""] * len(before), part] for part in more]
-        return Table(self.caption, self.columns, rows, self.numeric)
+        return Table(self.caption, self.columns, rows)
 
 
 @dataclass(frozen=True)
@@ -137,8 +150,9 @@ class Downloads:
 class Answer:
     """The first screen: headline, picture, and a card with the law, its key figures, cautions and files.
 
-    tests : how many, under which conditions. remarks : on the choice of the law. values : (symbol, value, ends of its
-    interval, unit) of the parameters.
+    tests : how many, under which conditions. remarks : on the choice of the law. values : (symbol, "= 2.8" or that it
+    is not determined, ends of its interval, unit) of the parameters. role : how serious the headline is, "" of a law
+    that the tests do not reject, "caution", "warning".
     picture : a Picture, or the Paragraph that says why there is none.
     more : what shows the rest. units : of the values. brackets : what the intervals of figures hold.
     figures : (name, where it holds, value with interval, remark).
@@ -159,6 +173,7 @@ class Answer:
     more: str = ".details()"
     units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
     brackets: str = ""
+    role: str = ""
 
     def __str__(self) -> str:
         """The lines of a terminal."""
@@ -233,6 +248,12 @@ def plural_of(name: str) -> str:
 def listed(words: Sequence[str]) -> str:
     """Words with commas, and 'and' before the last."""
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0] if words else "none"
+
+
+def first_of(names: Sequence[str], most: int, more: str = "") -> str:
+    """The first names, and how many more there are."""
+    others = len(names) - most
+    return ", ".join(names[:most]) + (f" and {others} more{more}" if others > 0 else "")
 
 
 MOST_NAMED = 4
@@ -313,7 +334,8 @@ def _lines(block: Block) -> list[str]:
     if isinstance(block, Paragraph):
         return _indented(f"warning: {block.text}" if block.role == "warning" else block.text, "")
     if isinstance(block, Items):
-        return [line for item in block.items for line in _indented(f"- {item}", "")]
+        title = _indented(block.title, "") if block.title and block.items else []
+        return [*title, *(line for item in block.items for line in _indented(f"- {item}", ""))]
     if isinstance(block, Table):
         table = block.filled.folded(WIDTH - 2)
         lines = [f"  {line}" for line in aligned(table.columns, table.rows, table.numeric)]
@@ -336,7 +358,7 @@ def _answer_lines(answer: Answer) -> list[str]:
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
     for intervals in (True, False):
         pieces = [
-            " ".join([f"{name} = {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
+            " ".join([f"{name} {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
             for name, value, ends, unit in answer.values
         ]
         elsewhere = ALL_DIGITS.format(more="" if intervals else " and intervals")

@@ -14,7 +14,8 @@ import numpy as np
 from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends, plural, plural_of
-from creepkit.reports.words import HEADLINES, TRUTHS
+from creepkit.reports.verdicts import cause_headline
+from creepkit.reports.words import FITS, HEADLINES, MISSES, TRUTHS
 
 if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
@@ -84,19 +85,37 @@ def spread_text(spread: float) -> str:
 
 def headline(fit: Identification) -> str:
     """What the law is to be used for and where, with its mean misfit, then whether it could be the true one."""
-    items, adequacy = Description.of(fit).items(), fit.adequacy
-    misfits = [f"{name} ({'mean misfit ' * (k == 0)}{spread_text(value)})" for k, (name, value) in enumerate(items)]
-    good, bad = (
-        [said for said, (_, value) in zip(misfits, items, strict=True) if (value <= USABLE) is usable]
-        for usable in (True, False)
+    items = Description.of(fit).items()
+    good, bad, described = (
+        " and ".join(words.format(what=name, misfit=spread_text(value)) for name, value in some)
+        for words, some in ((FITS, _usable(items)), (MISSES, _usable(items, False)), (MISSES, items))
     )
-    values = {"law": fit.law.name, "good": " and ".join(good), "bad": " and ".join(bad), "truth": _truth(fit)}
-    values["described"] = f"; {' and '.join(misfits)} so far" if items else ""
-    in_tests = adequacy is not None and adequacy.lies_in_tests
-    kind = f"{'between' if rejected(fit) and not in_tests else 'use'}{' in part' * bool(bad)}"
-    kind = kind if good else "use nothing" if bad else "fitted"
-    found = fit.converged or in_tests  # a cause goes before the search
-    return HEADLINES[kind if found else "not found"].format(**values)
+    described = f"; so far it misses {described}" if items else ""
+    values = {"law": fit.law.name, "good": good, "bad": bad, "truth": _truth(fit), "described": described}
+    return HEADLINES[headline_kind(fit)].format(**values)
+
+
+def headline_kind(fit: Identification) -> str:
+    """Which of HEADLINES is said of a law."""
+    items, in_tests = Description.of(fit).items(), fit.adequacy is not None and fit.adequacy.lies_in_tests
+    good, bad = _usable(items), _usable(items, False)
+    if not (fit.converged or in_tests):  # a cause goes before the search
+        return "not found"
+    if not good:
+        return "use nothing" if bad else "fitted"
+    return f"{'between' if rejected(fit) and not in_tests else 'use'}{' in part' * bool(bad)}"
+
+
+def headline_role(fit: Identification) -> str:
+    """How serious the first line is: "warning" of a law not to be used, "caution" of one that is in part, "" else."""
+    kind = headline_kind(fit)
+    usable = kind not in ("use nothing", "not found")
+    return "warning" if not usable else "caution" if rejected(fit) or "in part" in kind else ""
+
+
+def _usable(items: list[tuple[str, float]], usable: bool = True) -> list[tuple[str, float]]:
+    """Those of what a law describes that are within a factor of 2, or those that are not."""
+    return [pair for pair in items if (pair[1] <= USABLE) is usable]
 
 
 def rejected(fit: Identification | TemperatureLaw) -> bool:
@@ -124,7 +143,7 @@ def _truth(fit: Identification) -> str:
     elif adequacy.explains:
         kind = "explains"
     elif adequacy.lies_in_tests:
-        return TRUTHS["in tests"].format(cause=adequacy.explanations[0].headline)
+        return TRUTHS["in tests"].format(cause=cause_headline(adequacy.explanations[0]))
     else:
         kind = "rejected"
     return TRUTHS[kind]

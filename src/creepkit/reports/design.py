@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,16 +40,26 @@ def design_sentence(design: Design) -> str:
     if design.obstacle:
         return DESIGN[design.obstacle].format(**first)
     if not design.tests:
-        reasons = dict.fromkeys(f"that {kind_of_reason(reason)}" for _, reason in design.left_out)
-        return DESIGN["none"].format(reasons=" or ".join(reasons) or "of no kind")
-    best, expected = design.tests[0], [test.expectation for test in design.tests]
-    expected += [design.expected] if design.expected is not None else []
-    if design.goal == "law" and max(e.probability for e in expected) < USEFUL_PROBABILITY:
+        said = listed([f"{count} {reason}" for reason, count in _refusals(design).most_common()])
+        return DESIGN["none" if design.left_out else "nothing"].format(count=len(design.left_out), reasons=said)
+    best = design.tests[0]
+    if _is_hopeless(design):
         return DESIGN["hopeless"].format(test=best.description, probability=f"{best.expectation.probability:.2f}")
     if len(design.plan) > 1 and design.expected is not None:
         return DESIGN["plan"].format(count=len(design.plan), told=_told(design, design.expected))
     run = design.plan[0] if design.plan else best
     return DESIGN["test"].format(test=run.description, told=_told(design, run.expectation))
+
+
+def _is_hopeless(design: Design) -> bool:
+    """Whether no test is likely to decide between the laws."""
+    expected = [test.expectation for test in design.tests] + [one for one in [design.expected] if one is not None]
+    return design.goal == "law" and max((e.probability for e in expected), default=1.0) < USEFUL_PROBABILITY
+
+
+def _refusals(design: Design) -> Counter[str]:
+    """Why candidates were left out, and how many each."""
+    return Counter(kind_of_reason(reason) for _, reason in design.left_out)
 
 
 def _told(design: Design, expected: Expectation) -> str:
@@ -72,24 +83,35 @@ def _question(design: Design) -> str:
 def design_answer(design: Design, picture: Block | None = None) -> Answer:
     """The next test or the runs of the plan, what they tell, the next best, what to mind and what to do."""
     runs = design.plan or design.tests[:1]
-    hours = f"{sum(run.hours for run in runs):.3g} h of machine time with setting up"
+    hours = f"{_hours(sum(run.hours for run in runs))} h of machine time with setting up"
     alike = {run.description: [one for one in runs if one.description == run.description] for run in runs}
     shown = [(plural(len(same), "run"), same[0]) for same in alike.values() if len(runs) > 1]
     shown += [("next best", test) for test in design.tests if test.description not in alike][:MOST_NEXT]
     figures = [
-        (f"{name}, {run.description}", "", _precision(design, run.expectation), f"{run.hours:.3g} h of machine time")
+        (
+            f"{name}, {run.description}",
+            "",
+            _precision(design, run.expectation),
+            f"{_hours(run.hours)} h of machine time",
+        )
         for name, run in shown
     ]
+    obstacle = design.obstacle or "one law" * _is_hopeless(design)
+    limit = next((reason for reason, _ in _refusals(design).most_common(1)), "none")
     return Answer(
         design.sentence,
         f"{hours}; {plural(len(design.tests), 'test')} considered" if runs else "",
         figures=figures,
         cautions=design.notes[:MOST_CAUTIONS],
-        next_step=DESIGN[f"next {design.obstacle or ('make' if runs else 'none')}"],
+        next_step=DESIGN[f"next {obstacle or ('make' if runs else limit)}"],
         remarks=[_question(design)] if design.goal == "law" and runs else [],
         picture=picture,
         more=".details(), or creepkit design --json",
     )
+
+
+def _hours(hours: float) -> str:
+    return f"{float(f'{hours:.3g}'):g}"
 
 
 def _precision(design: Design, expected: Expectation) -> str:
@@ -119,7 +141,7 @@ def design_blocks(design: Design, figures: PageFigures | None = None, of: str = 
         reasons.setdefault(kind_of_reason(reason), []).append(description)
     lines = [f"left out: {len(names)} that {reason} ({names[0]})" for reason, names in reasons.items()]
     lines += design.notes[MOST_CAUTIONS:] if design.tests else ()
-    return [*blocks, Items(lines)] if lines else blocks
+    return [*blocks, Items(lines)]
 
 
 def _table(design: Design) -> Table:
@@ -136,10 +158,10 @@ def _table(design: Design) -> Table:
         if design.goal != "parameters":
             told = [f"{e.probability:.2f}" if design.goal == "law" else precision_text(e.sd, design.unit)]
         nats = (f"{one:.2g}" if one else "–" for one in (e.information, test.information_per_hour))
-        rows.append((test.description, f"{test.hours:.3g}", *nats, *told))
+        rows.append((test.description, _hours(test.hours), *nats, *told))
     caption = ORDER_BY_LAW if design.goal == "law" else ORDER
     columns = ("planned test", "machine time, h", "nats", "nats / h", *heads)
-    return Table(caption, columns, rows, numeric=range(1, len(columns)))
+    return Table(caption, columns, rows)
 
 
 ORDER = "the best tests, by the expected information for each hour of machine time; by a nat 2.7 times as much is known"

@@ -77,25 +77,13 @@ def extraction_figure(extraction: Extraction) -> Figure:
             axes.plot(e.times, np.where(e.used, values, np.nan), lw=1.0, label=label)
         axes.legend(fontsize=7, ncols=3)
         _dress(axes, e, title)
-    figure.suptitle(_title(e), fontsize=10, x=0.01, ha="left")
+    figure.suptitle("\n".join(extraction_text(e).splitlines()[:2]), fontsize=10, x=0.01, ha="left")
     return figure
 
 
 def draw_extraction(axes: Axes, extraction: Extraction) -> None:
     """The first output over time with its band."""
     _draw_output(axes, extraction, next(iter(extraction.outputs)))
-
-
-def _title(e: Extraction) -> str:
-    x, y = e.center
-    flagged = len({frame for flag in e.flags for frame in flag.frames})
-    kinds = ", ".join(sorted({flag.kind for flag in e.flags}))
-    return (
-        f"{e.source}, {e.name}: {e.operator}; centre {x:.2f}, {y:.2f} mm "
-        f"({'given' if e.center_given else f'+- {1e3 * float(e.center_sd.max()):.0f} um'}); "
-        f"{e.used.sum()} of {e.times.size} frames used, {flagged} flagged{f' ({kinds})' if kinds else ''}; "
-        f"noise {1e3 * e.noise.point_sd:.2f} um a point, correlated over {e.noise.correlation_length:.2f} mm"
-    )
 
 
 def _draw_maps(

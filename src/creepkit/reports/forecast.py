@@ -119,8 +119,8 @@ def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
 
 
 def _misfit_text(misfit: LawMisfit) -> str:
-    factor = f"{math.exp(abs(misfit.log_factor)):.3g}"
-    return FORECAST["misses"].format(factor=factor, here=f"{misfit.factor:.3g}")
+    factor, here = f"{math.exp(abs(misfit.log_factor)):.3g}", f"{misfit.factor:.3g}"
+    return FORECAST["misses"].format(factor=factor, allowed=FORECAST["allowed"].format(here=here) * (here != "1"))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -141,7 +141,7 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
     new = {line: names for line, names in said.items() if line not in answer.cautions}
     lines = [f"{named(names, 'test')}: {line}" if several else line for line, names in new.items()]
     listed_there = len(answer.figures) + 1 >= len(rows) and not several
-    return [answer, *([] if listed_there else [table]), *([Items(lines)] if lines else [])]
+    return [answer, *([] if listed_there else [table]), Items(lines)]
 
 
 def _remarks(test: TestForecast) -> Iterator[str]:
@@ -243,8 +243,8 @@ def forecast_figure(forecast: Forecast) -> Figure:
     ]
     figure, panels = panel_grid(len(drawn), COLUMNS, max(4.4, 6.6 / len(drawn)), 3.6)  # as wide as the legend at least
     for axes, (test, one) in zip(panels, drawn, strict=True):
-        _draw_curve(axes, test, one)
-    _legend(figure, forecast, [test for test, _ in drawn], loc="outside lower center", ncols=3)
+        _draw_curve(axes, test, one, f"{100 * forecast.level:g} %")
+    _legend(figure, panels, loc="outside lower center", ncols=3)
     left_out = len(forecast.tests) - len({test.name for test, _ in drawn})
     more = f" ({left_out} more tests are not drawn)" if left_out > 0 else ""
     title = f"forecast by {' or '.join(forecast.laws)}{more}"
@@ -255,8 +255,8 @@ def forecast_figure(forecast: Forecast) -> Figure:
 def draw_forecast(axes: Axes, forecast: Forecast) -> None:
     """The leading output of the first test with both bands."""
     test = _drawable(forecast)[0]
-    _draw_curve(axes, test, next(iter(test.outputs.values())))
-    _legend(axes, forecast, [test])
+    _draw_curve(axes, test, next(iter(test.outputs.values())), f"{100 * forecast.level:g} %")
+    _legend(axes, [axes])
 
 
 def _drawable(forecast: Forecast) -> list[TestForecast]:
@@ -270,7 +270,7 @@ def _scaled(one: OutputForecast) -> float:
     return 100.0 if is_logarithmic(one.output) else 1.0
 
 
-def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
+def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
     factor, logarithmic = _scaled(one), is_logarithmic(one.output)
     positive = one.times > 0
@@ -283,14 +283,16 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
     top = float(known.max(initial=1e-12))
     span(axes, "y", known[known >= SHOWN_RATIO * top] if logarithmic else known, 1.1 * top, logarithmic=logarithmic)
     ends = axes.get_ylim()
-    for lower, upper, alpha in ((lowest, highest, 0.15), (low, high, 0.3)):
-        axes.fill_between(hours, np.clip(lower, *ends), np.clip(upper, *ends), color="#3b6fb6", alpha=alpha, lw=0)
-    axes.plot(hours, curve, color="#1f3f73", lw=1.3)
-    axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6)
+    for lower, upper, alpha, what in ((lowest, highest, 0.15, "whole curves"), (low, high, 0.3, "measured values")):
+        style: Any = {"color": "#3b6fb6", "alpha": alpha, "lw": 0, "label": f"{level} of {what}"}
+        axes.fill_between(hours, np.clip(lower, *ends), np.clip(upper, *ends), **style)
+    axes.plot(hours, curve, color="#1f3f73", lw=1.3, label="identified law")
+    label = "measured" if measured.size else None
+    axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6, label=label)
     start, end = float(hours[0]) if logarithmic else 0.0, _time_end(test)
     span(axes, "x", start, end, logarithmic=logarithmic)
     axes.set_xlim(0.95 * start, 1.03 * end)
-    _draw_times(axes, test, one)
+    _draw_times(axes, test, one, level)
     axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
     axes.set_xlabel("time, h", fontsize=8)
@@ -314,7 +316,7 @@ def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, F
     return history.times[used] / SECONDS_PER_HOUR, factor * history.outputs[output][used]
 
 
-def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
+def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, interval: str) -> None:
     """Intervals of times, the median marked: at the value that is reached, and of rupture at the upper edge."""
     right, (bottom, top) = axes.get_xlim()[1], axes.get_ylim()
     edge = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
@@ -325,7 +327,9 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
         if time.output not in ("", one.output) or not bottom <= level <= top or not low <= right:
             continue
         colour = RUPTURE_COLOUR if is_rupture else TIME_COLOUR
-        axes.plot([low, min(high, right)], [level, level], color=colour, lw=2.2, solid_capstyle="butt", zorder=4)
+        label = f"time to {'rupture' if is_rupture else 'a value'}: median, {interval}"
+        style: Any = {"color": colour, "lw": 2.2, "solid_capstyle": "butt", "zorder": 4, "label": label}
+        axes.plot([low, min(high, right)], [level, level], **style)
         if high > right:
             axes.plot([right], [level], ">", color=colour, ms=5, clip_on=False, zorder=5)
         if median <= right:
@@ -334,23 +338,8 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast) -> None:
             axes.plot([measured], [level], "x", color="black", ms=5, zorder=6)
 
 
-def _legend(of: Figure | Axes, forecast: Forecast, tests: Sequence[TestForecast], **place: Any) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    per_cent = f"{100 * forecast.level:g} %"
-    drawn = {not t.output for test in tests for t in test.times if t.low <= 1.03 * SECONDS_PER_HOUR * _time_end(test)}
-    times = ((False, "a value", TIME_COLOUR), (True, "rupture", RUPTURE_COLOUR))
-    look: Any = {"lw": 2.2, "marker": "|", "ms": 9, "mew": 2}
-    handles = [
-        Line2D([], [], color="#1f3f73", lw=1.3, label="identified law"),
-        Patch(color="#3b6fb6", alpha=0.45, label=f"{per_cent} of measured values"),
-        Patch(color="#3b6fb6", alpha=0.15, label=f"{per_cent} of whole curves"),
-        *([Line2D([], [], color="black", marker=".", ls="", label="measured")] if any(t.inside for t in tests) else []),
-        *(
-            Line2D([], [], color=colour, label=f"time to {word}: median, {per_cent}", **look)
-            for rupture, word, colour in times
-            if rupture in drawn
-        ),
-    ]
-    of.legend(handles=handles, fontsize=7, **place)
+def _legend(of: Figure | Axes, panels: Sequence[Axes], **place: Any) -> None:
+    """What is drawn in some panels, each kind once."""
+    drawn = [zip(*axes.get_legend_handles_labels(), strict=True) for axes in panels]
+    handles = {label: handle for pairs in drawn for handle, label in pairs}
+    of.legend(handles.values(), handles.keys(), fontsize=7, **place)

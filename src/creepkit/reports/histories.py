@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.records import SECONDS_PER_HOUR, History, is_logarithmic, load_unit, output_named, output_unit
+from creepkit.records.held_levels import held_temperatures
 from creepkit.records.specimen_lookup import lengths_by_default
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, plural
+from creepkit.records.units import celsius_text, time_text
+from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, listed, plural
 from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
 from creepkit.reports.json_values import fields_to_json
-from creepkit.reports.load_programs import kind_of_test, program_text
+from creepkit.reports.load_programs import kind_of_test, load_text, program_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +32,22 @@ MOST_VALUES = 4
 
 
 def histories_text(histories: Sequence[History]) -> str:
-    """A row for each test, then what holds for all or some of them."""
-    return as_text([_table(histories), Items(_remarks(histories))]).strip("\n")
+    """How many tests of what, a row for each, then what holds for all or some of them."""
+    head = [Paragraph(_headline(histories))] if len(histories) > 1 else []
+    return as_text([*head, _table(histories), Items(_remarks(histories))]).strip("\n")
+
+
+def _headline(histories: Sequence[History]) -> str:
+    """How many tests of which kind, under which loads and temperatures, until when, and how many broke."""
+    kinds = [kind for kind, _ in Counter(map(kind_of_test, histories)).most_common(MOST_VALUES)]
+    kelvin = [T for one in histories for T in held_temperatures(one)]
+    loads = [load_text(one) for one in sorted(histories, key=lambda one: float(np.abs(one.load_levels).max()))]
+    temperatures = celsius_text(min(kelvin), max(kelvin), digits=0)
+    broken = sum(one.rupture_time is not None for one in histories)
+    span = " to ".join(dict.fromkeys([loads[0], loads[-1]]))
+    until = time_text(max(float(one.times[-1]) for one in histories))
+    found = f"{plural(len(histories), 'test')}: {listed(kinds)}, {span}, {temperatures}, to {until}"
+    return f"{found}; {broken} to rupture" if broken else found
 
 
 def history_blocks(histories: Sequence[History], more: str = "") -> list[Block]:
@@ -78,7 +94,7 @@ def _row(history: History) -> tuple[str, ...]:
     return (
         f"{history.name}: {history.specimen}{history.alloy and f', {history.alloy}'}, {program_text(history)}",
         _end_text(history) or "end not stated",
-        frames if history.outputs else "none",
+        frames if history.outputs else "–",
         "; ".join(outputs) or _rate_text(history),
     )
 
@@ -119,7 +135,7 @@ def _rate_text(history: History) -> str:
     if history.minimum_rate is None:
         return "no frames"
     sd = "" if history.minimum_rate_sd is None else f" +- {history.minimum_rate_sd:.2g}"
-    return f"minimum creep rate {history.minimum_rate:.4g}{sd} 1/s"
+    return f"minimum rate {history.minimum_rate:.4g}{sd} 1/s"
 
 
 def _end_text(history: History) -> str:

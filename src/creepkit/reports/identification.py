@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.adequacy import UNDETECTED_SCATTER, noises_text
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.noise_model import MINIMUM_TESTS
@@ -28,10 +28,9 @@ from creepkit.reports.answer import (
     key_figures,
     reference_sentences,
     symbols_of,
-    unit_text,
     value_cells,
 )
-from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, as_text, number, plural
+from creepkit.reports.blocks import Block, Cell, Formula, Items, Paragraph, Table, as_text, first_of, number, plural
 from creepkit.reports.compared_values import (
     LAW_RATE_MEANING,
     OWN_RATE_CHI_SQUARE,
@@ -92,36 +91,30 @@ def value_blocks(fit: Identification, verdict: str = "", equivalents: Sequence[s
         blocks += [Paragraph(text) for text in _assumed_duration(fit)]
     blocks += [Paragraph(text) for text in (*_left_out(fit), *interval_basis(fit))]
     blocks += [] if fit.sparsity is None else [Paragraph(fit.sparsity.verdict)]
-    if not rejected(fit) and (undetermined := fit.undetermined()):
-        blocks += [Paragraph("what these tests do not determine, or poorly, given this law:"), Items(undetermined)]
+    if not rejected(fit):
+        blocks.append(Items(fit.undetermined(), "what these tests do not determine, or poorly, given this law:"))
     unmodelled = [effect.sentence for effect in beyond_intervals(fit.unmodelled)]
-    if unmodelled:
-        blocks += [
-            Paragraph("the intervals do not include what would move the rate amid the tests:"),
-            Items(unmodelled),
-        ]
+    blocks.append(Items(unmodelled, "the intervals do not include what would move the rate amid the tests:"))
     notes = [note for note in fit.notes if not (unmodelled and note.startswith(NOT_INCLUDED))]  # said above
-    return [*blocks, Paragraph("remarks:"), Items(notes)] if notes else blocks
+    return [*blocks, Items(notes, "remarks:")]
 
 
 def _values(fit: Identification) -> Table:
     """Values with intervals; of a law that the tests reject only which of them these would not determine."""
-    table, symbols = fit.law.table, symbols_of(fit.law)
-    rows = [
-        (
-            symbols[e.name],
-            table[e.name].meaning,
-            *value_cells(fit.law, e),
-            unit_text(e.unit),
-            "–" if rejected(fit) and e.verdict == "determined" else verdict_given_law(fit, e),
-        )
+    table, symbols, held = fit.law.table, symbols_of(fit.law), ", if the law held" * rejected(fit)
+    rows: list[dict[str, Cell]] = [
+        {
+            "parameter": symbols[e.name],
+            "meaning": table[e.name].meaning,
+            **value_cells(fit.law, e, held),
+            f"by these tests{held or ', given this law'}": (
+                "–" if held and e.verdict == "determined" else verdict_given_law(fit, e)
+            ),
+        }
         for e in fit.estimates
     ]
-    held = ", if the law held" if rejected(fit) else ""
-    last = f"by these tests{held or ', given this law'}"
-    columns = ("parameter", "meaning", "value", f"95 % interval{held}", "unit", last)
     caption = "values to ten digits (JSON has all), for stress as a ratio to 1 MPa and time as a ratio to 1 s"
-    return Table(f"{'a law that does not fit the tests: ' * bool(held)}{caption}", columns, rows, numeric=(2, 3))
+    return Table.of(f"{'a law that does not fit the tests: ' * bool(held)}{caption}", rows)
 
 
 def verdict_given_law(fit: Identification, estimate: Estimate) -> str:
@@ -256,7 +249,7 @@ def _table_of_tests(fit: Identification) -> Table:
         caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
     if any(t.rupture and not t.rupture.used for t in fit.tests):
         caption += "; the law was identified without the ends of some tests"
-    return Table(caption, columns, rows, numeric=tuple(range(2, len(columns))))
+    return Table(caption, columns, rows)
 
 
 def _sums(fit: Identification) -> list[str]:
@@ -297,9 +290,8 @@ def _without_misfit(fit: Identification) -> list[str]:
             return ["χ² is not known: the tests were not given with this identification"]
         return ["χ² is not known: nor is the noise of a reading, well enough to judge by"]
     others = [t.name for k, t in enumerate(fit.tests) if t.outputs and not readings.mask(k).any()]
-    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
-    named = f"{', '.join(others[:MOST_NAMED])}{more}"
-    return [f"χ² is a dash where the noise of a reading is not known: {named}"] if others else []
+    said = f"χ² is a dash where the noise of a reading is not known: {first_of(others, MOST_NAMED)}"
+    return [said] if others else []
 
 
 def logarithmic_output(fit: Identification) -> str:
@@ -330,42 +322,34 @@ def noise_blocks(fit: Identification) -> list[Block]:
         error = fit.errors.get(name) if name != RUPTURE_OUTPUT and not is_logarithmic(name) else None
         rms = "–" if error is None else f"{error.mean_squared_error**0.5:.3g} ({100 * error.relative_rms_error:.2g} %)"
         squared = "–" if error is None else number(error.relative_squared_error, 3)
-        sizes = (_judged_noise(fit, name), number(one.noise, 2), number(one.offset, 2))
-        rows.append((name.replace("_", " "), output_unit(name) or "1", *sizes, rms, squared))
+        sizes = {"of a reading": _judged_noise(fit, name), "in the fit": number(one.noise, 2)}
+        sizes |= {"offset of a test": number(one.offset, 2), "rms misfit": rms, "squared error": squared}
+        rows.append({"output": name.replace("_", " "), "unit": output_unit(name) or "1", **sizes})
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if name := logarithmic_output(fit):
         part = fit.noise_model[name]
         share = math.hypot(RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, part.drift, part.misfit)
         blocks.append(Paragraph(f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"))
-    if rows:
-        columns = ("output", "unit", "of a reading", "in the fit", "offset of a test", "rms misfit", "squared error")
-        caption = (
-            "noise as it was estimated, one standard deviation. Of a reading: by which the law is judged, from what "
-            "its test states or its neighbours show. In the fit: one for all. Misfit and error: what the law leaves"
-        )
-        blocks.append(Table(caption, columns, rows, numeric=(2, 3, 4, 5, 6)))
+    caption = (
+        "noise as it was estimated, one standard deviation. Of a reading: by which the law is judged, from what "
+        "its test states or its neighbours show. In the fit: one for all. Misfit and error: what the law leaves"
+    )
     unknown = {n.kind for n in fit.settings.nuisances if n.sd is None}
     nuisances = [
-        (
-            n.key,
-            n.owner or "all",
-            f"{number(n.value)} +- {number(n.sd, 2)}",
-            f"{number(n.prior_mean)} +- {number(n.prior_sd, 2)}{', spread estimated' if n.kind in unknown else ''}",
-            _nuisance_unit(n, fit),
-            number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–",
-        )
+        {
+            "nuisance parameter": n.key,
+            "of": n.owner or "all",
+            "estimate": f"{number(n.value)} +- {number(n.sd, 2)}",
+            "prior": f"{number(n.prior_mean)} +- {number(n.prior_sd, 2)}" + ", spread estimated" * (n.kind in unknown),
+            "unit": _nuisance_unit(n, fit),
+            "deviation over sd of the prior": (
+                number((n.value - n.prior_mean) / n.prior_sd, 2) if n.prior_sd > 0 else "–"
+            ),
+        }
         for n in fit.nuisances
     ]
-    if nuisances:
-        heads = ("nuisance parameter", "of", "estimate", "prior", "unit", "deviation over sd of the prior")
-        blocks.append(Table("nuisance parameters estimated beside the law", heads, nuisances, numeric=(2, 3, 5)))
-    return [*blocks, *_correlations(fit)]
-
-
-def scatter_of_rates(fit: Identification) -> str:
-    """One standard deviation of ln rate between tests, in per cent; whether an estimate of it found none."""
-    rate = fit.noise_model.rate
-    return "none detected" if 0.0 < rate <= UNDETECTED_SCATTER else f"{noises_text(100 * rate)} %"
+    tables = [Table.of(caption, rows), Table.of("nuisance parameters estimated beside the law", nuisances)]
+    return [*blocks, *(table for table in tables if table.rows), *_correlations(fit)]
 
 
 def rate_scatter_sentence(fit: Identification) -> str:
@@ -426,7 +410,7 @@ def correlation_table(correlation: Correlation, caption: str = "") -> Table:
     """The matrix with its names."""
     names = correlation.names
     rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
-    return Table(caption, ("parameter", *names), rows, numeric=tuple(range(1, len(names) + 1)))
+    return Table(caption, ("parameter", *names), rows)
 
 
 # ---- comments of exports ---------------------------------------------------------------------------------------------

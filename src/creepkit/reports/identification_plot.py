@@ -53,8 +53,12 @@ PANEL_WIDTH, PANEL_HEIGHT = 4.1, 3.4
 """Inches of a panel of an answer: so small that a telephone shows it as it was drawn."""
 
 
-LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), ((2.0, -3.0), (2.0, 6.0), (2.0, -12.0))
-"""Points of a label, and where it may stand beside the end of its curve; one that would cover others is left out."""
+LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), np.array([(2.0, -3.0), (-9.0, 4.0), (-9.0, -11.0), (-21.0, -3.0)])
+"""Points of a label, and where it may stand beside a point of its curve: right, above, below, left."""
+
+
+LABEL_CLEAR, LABEL_STEP = 4.0, 8
+"""Points that it is clear of other curves, beyond which further away is no better; and between places tried."""
 
 
 MOST_LABELLED = 16
@@ -131,31 +135,50 @@ def _draw_leading(
     output, tests = max(leading.items(), key=lambda pair: len(pair[1]))
     _draw_curves(axes, fit, fitted_curves(fit), output, tests, scale.colours)
     by_stress = stress_scale(fit.histories, fit.predictor)
+    levels, unit = by_stress.values, "MPa"
+    if all(h.loading.quantity == "strain" for h in fit.histories):  # whose stress is what was measured
+        levels, unit = np.array([100.0 * np.abs(h.load_levels).max() for h in fit.histories]), "% strain"
     labelled = scale.label != by_stress.label and len(tests) <= MOST_LABELLED
-    beside = f"; beside them {by_stress.label.rpartition(' ')[2]}" * labelled
-    axes.set_title(f"dots: measured; lines: by the law, 95 %{beside}", fontsize=9)
-    if labelled:
-        _label_stresses(axes, fit, by_stress.values, tests, scale.colours)
+    beside = f"; beside: {unit}" * labelled
+    axes.set_title(f"dots: measured; lines: law, 95 %{beside}", fontsize=9)
     if bar and np.ptp(scale.values) > 0:
         scale.add_bar(axes)
+    if labelled:
+        _label_curves(
+            axes, [f"{level:.{2 + (unit == 'MPa')}g}" for level in levels[tests]], [scale.colours[k] for k in tests]
+        )
 
 
-def _label_stresses(
-    axes: Axes, fit: Identification, stresses: Floats, tests: Sequence[int], colours: Sequence[Any]
-) -> None:
-    """The stress of each test, MPa, at the end of its curve; stresses : (tests,)."""
-    lines, shown = [line for line in axes.lines if line.get_linestyle() != "None"], list[Floats]()
-    for k, line in zip(tests, lines, strict=True):
+def _label_curves(axes: Axes, labels: Sequence[str], colours: Sequence[Any]) -> None:
+    """A label beside each curve where it is clear of others; none where no place is.
+
+    Of all places beside points of the curve the clearest one, of equal ones that nearest to its end.
+    """
+    figure: Any = axes.get_figure(root=True)
+    figure.draw_without_rendering()  # axes have their places from here on
+    scale, taken = 72.0 / figure.dpi, list[Floats]()
+    (left, bottom), (right, top) = axes.get_window_extent().get_points() * scale
+    every, curves = np.arange(left, right), []
+    for line in (one for one in axes.lines if one.get_linestyle() != "None"):
         points = np.asarray(line.get_xydata())
-        known = points[np.isfinite(points).all(axis=1)]
-        if known.size:
-            place = (float(known[-1, 0]), float(known[-1, 1]))
-            end = axes.transData.transform(place) * 72.0 / axes.figure.dpi
-            free = [one for one in LABEL_PLACES if all((abs(end + one - o) > LABEL_SIZE).any() for o in shown)]
-            for offset in free[:1]:
-                shown.append(end + offset)
-                text = {"textcoords": "offset points", "fontsize": 8, "color": colours[k]}
-                axes.annotate(f"{stresses[k]:.3g}", place, offset, **text)
+        points = axes.transData.transform(points[np.isfinite(points).all(axis=1)]) * scale
+        heights = np.interp(every, points[:, 0], points[:, 1], left=np.nan, right=np.nan)
+        curve = np.column_stack([every, heights])
+        curves.append(curve[(curve[:, 1] >= bottom) & (curve[:, 1] <= top)])
+    drawn = np.concatenate(curves)
+    for label, colour, curve in zip(labels, colours, curves, strict=True):
+        best, clearest = None, 0.0
+        for anchor in curve[::-LABEL_STEP]:
+            for corner in anchor + LABEL_PLACES:
+                beside = np.maximum(np.maximum(corner - drawn, drawn - corner - LABEL_SIZE), 0.0)
+                clear = min(float(np.hypot(*beside.T).min(initial=LABEL_CLEAR)), LABEL_CLEAR)
+                free = all((abs(corner - one) > LABEL_SIZE).any() for one in taken)
+                if free and clear > clearest and corner[0] > left and corner[1] + LABEL_SIZE[1] < top:
+                    best, clearest = corner, clear
+        if best is not None:
+            taken.append(best)
+            x, y = axes.transData.inverted().transform(best / scale)
+            axes.text(float(x), float(y), label, fontsize=8, color=colour)
 
 
 def draw_curve(
@@ -172,13 +195,12 @@ def draw_curve(
             alpha=0.55,
             zorder=3 if above else 1,
         )
-    low, high, identified = *curve.band, curve.identified
-    if curve.logarithmic:  # beyond the strains of the test a curve towards rupture says nothing of its frames
-        end = _drawn_end(curve)
-        low, high = np.minimum(low, end), np.minimum(high, end)
-        identified = np.where(identified <= end, identified, np.nan)
-    axes.fill_between(curve.hours, low, high, color=colour, alpha=opacity, lw=0)
-    axes.plot(curve.hours, identified, style, lw=1.2, color=colour)
+    from matplotlib.collections import PolyCollection
+
+    # beyond the strains of the test a curve towards rupture says nothing of its frames
+    end = _drawn_end(curve) if curve.logarithmic else np.inf
+    axes.add_collection(PolyCollection(curve.bands(end), color=colour, alpha=opacity, lw=0), autolim=False)
+    axes.plot(curve.hours, np.where(curve.identified <= end, curve.identified, np.nan), style, lw=1.2, color=colour)
 
 
 def _drawn_end(curve: TestCurve) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import unit_text
-from creepkit.reports.blocks import aligned
+from creepkit.reports.blocks import aligned, listed, named
 from creepkit.reports.identification import correlation_table
 
 if TYPE_CHECKING:
@@ -19,6 +19,19 @@ if TYPE_CHECKING:
 
 
 # ---- term selection --------------------------------------------------------------------------------------------------
+
+
+def sparsity_verdict(sparsity: Sparsity) -> str:
+    """What was dropped, and what that cost, in one sentence."""
+    dropped = [f"'{name}'" for name in sparsity.dropped_terms] + [f"exponent {e}" for e in sparsity.exponents_off]
+    if not dropped:
+        return f"all terms of '{sparsity.law}' are kept"
+    cost = (
+        f"chi-square rises by {max(sparsity.chi_square_rise, 0.0):.1f} for {sparsity.parameters_dropped} parameters "
+        f"fewer (p = {sparsity.p_value:.2g}) and -2 ln of the evidence changes by {sparsity.score_difference:+.1f}"
+    )
+    kept = f"{named(sparsity.kept_terms, 'test')} suffice{'s' * (len(sparsity.kept_terms) == 1)}"
+    return f"without {listed(dropped)} of '{sparsity.law}' {cost}: {kept}"
 
 
 def sparsity_text(sparsity: Sparsity) -> str:

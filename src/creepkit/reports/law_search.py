@@ -28,7 +28,7 @@ def law_search_text(search: LawSearch) -> str:
         for one in sorted(laws.values(), key=lambda law: (law.complexity, law.misfit))
     ]
     columns = ("law", "parameters", "complexity", "rms ln strain", "behind", "on the front")
-    table = Table("no simpler law than one on the front has a smaller misfit", columns, rows, numeric=(1, 2, 3, 4))
+    table = Table("no simpler law than one on the front has a smaller misfit", columns, rows)
     answer = answer_text(search.best, search.ranking, searched=[one.law.name for one in search.tried])
     return f"{answer}\n\n{as_text([table, Paragraph(effort_text(search))])}"
 

@@ -37,10 +37,9 @@ def load_text(history: History) -> str:
     if isinstance(loading, PointLoading):
         parts = [f"stress {name} {_level_text(p, last, ' MPa')}" for name, p in loading.stress.items()]
         return ", ".join(parts + [f"strain {name} {_level_text(p, last, '')}" for name, p in loading.strain.items()])
-    unit = load_unit(history)
-    if not unit:
-        return f"{loading.quantity} {_level_text(loading.program(), last, '')}"
-    return _level_text(loading.program(), last, f" {unit}")
+    if loading.quantity == "strain":
+        return _level_text(loading.program(), last, " % strain", 100.0)
+    return _level_text(loading.program(), last, f" {load_unit(history)}")
 
 
 def kind_of_test(history: History) -> str:
@@ -77,9 +76,9 @@ def strain_rate(history: History) -> float | None:
     return rate if rate > 0 and even else None
 
 
-def _level_text(program: Program, last: float, unit: str) -> str:
+def _level_text(program: Program, last: float, unit: str, factor: float = 1.0) -> str:
     tolerance = HELD_LOAD * float(np.abs(program.values).max())
-    return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{v:g}")
+    return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{factor * v:.4g}")
 
 
 def temperature_text(history: History) -> str:

@@ -14,6 +14,7 @@ from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import named
 from creepkit.reports.description import rejected
+from creepkit.reports.verdicts import cause_next_step
 from creepkit.reports.words import NEXT, TRY
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
         bounds = f" and bounds for {names}" if weak else ""
         return NEXT["search"].format(starts=2 * fit.settings.starts, bounds=bounds)
     if in_tests is not None:
-        return in_tests.next_step
+        return cause_next_step(in_tests)
     if adequacy is not None and adequacy.remedies:
         return NEXT["remedy"].format(remedy=adequacy.remedies[0])
     if rejected(fit):

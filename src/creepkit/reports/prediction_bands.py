@@ -6,7 +6,7 @@ C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One predicti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -35,16 +35,22 @@ class FittedCurves:
 
     half_width : (tests, times, outputs) half width of the 95 % band from the covariance of the law's parameters and of
         explicit nuisance parameters, in the output's unit. Noise, the scatter of rates between tests and the offsets'
-        uncertainty are not in it.
+        uncertainty are not in it. growth : (tests, times, outputs) derivative to ln time; 0 of no strains.
     """
 
     prediction: Prediction
     half_width: Floats
+    growth: Floats
 
-    def of(self, test: int, output: str) -> tuple[Floats, Floats]:
-        """Curve and half width of the band, (times,) each, of one output of one test, in the output's unit."""
+    def of(self, test: int, output: str) -> tuple[Floats, Floats, Floats]:
+        """Curve, half width of the band and growth, (times,) each, of an output of a test, in the output's unit."""
         position, length = self.prediction.outputs.index(output), int(self.prediction.lengths[test])
-        return self.prediction.of(test)[:, position], self.half_width[test, :length, position]
+        band, growth = (of[test, :length, position] for of in (self.half_width, self.growth))
+        return self.prediction.of(test)[:, position], band, growth
+
+
+BEFORE = 1e-4
+"""Of a time: how much earlier a curve is predicted for its slope, which its frames do not show before a rupture."""
 
 
 _KNOWN_CURVES: WeakKeyDictionary[Identification, FittedCurves] = WeakKeyDictionary()
@@ -74,12 +80,17 @@ def _fitted_curves(fit: Identification) -> FittedCurves:
         jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)
     jacobian = np.concatenate([jacobian, _nuisance_jacobian(fit, prediction)], axis=-1)
     variance = np.einsum("...i,ij,...j->...", jacobian, joint_covariance(fit), jacobian)
+    growth = np.zeros_like(prediction.values[0])
+    if any(map(is_logarithmic, prediction.outputs)):
+        before = [replace(one, times=(1.0 - BEFORE) * one.times) for one in histories]
+        values = fit.predictor.predict(fit.law, coordinates.theta(fit.u)[None], before, nuisances=nuisances).values
+        growth = (prediction.values - values)[0] / BEFORE
     if fit.numerical_error is not None:
         prediction = with_correction_at_frames(fit.least_squares_problem, histories, prediction)
     for k, test in enumerate(fit.tests):
         for output_fit in test.outputs:
             prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
-    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
+    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)), growth)
 
 
 def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:
@@ -114,6 +125,10 @@ def joint_covariance(fit: Identification) -> Floats:
 # ---- as they are drawn -----------------------------------------------------------------------------------------------
 
 
+WIDEST, WIDE_SHARE = 3.0, 0.1
+"""Factor to either side within which bands are drawn, and the share of a curve that may be beyond."""
+
+
 PLOTTED_STRAIN_RATIO = 0.02
 """Differences of logarithms of strains are taken where a test's strain exceeds this share of its last one."""
 
@@ -125,7 +140,7 @@ class TestCurve:
     hours : (frames,) h.
     measured, identified : (frames,) in the unit of the axis, offsets taken off where the axis is logarithmic.
     half_width : (frames,) of the 95 % band, in the same unit; of the logarithm where the axis is logarithmic.
-        NaN where the law predicts nothing, as after a rupture.
+        NaN where the law predicts nothing, as after a rupture. slope : (frames,) of the logarithm over that of time.
     residuals : (frames,) measured less identified, in the unit of the axis, or 100 times the difference of their
         logarithms where the axis is logarithmic; NaN where that would be noise alone.
     """
@@ -136,40 +151,50 @@ class TestCurve:
     measured: Floats
     identified: Floats
     half_width: Floats
+    slope: Floats
     residuals: Floats
     logarithmic: bool
 
-    @property
-    def band(self) -> tuple[Floats, Floats]:
-        """Lower and upper end of the 95 % band, (frames,) each.
+    def bands(self, end: float = np.inf) -> list[Floats]:
+        """Outlines (points, 2) of the 95 % band, hours and values, where the curve lies below `end`.
 
-        Quantiles of curves that never fall do not fall: near a rupture, whose time is uncertain, only a linear
-        approximation of the lower end would.
+        Logarithmic curves have it across themselves: of values where they are flat, of times where they are steep, as
+        before a rupture, whose time is what is uncertain. To first order both are the same: with s the slope of ln
+        value over ln time and h the half width, a point moves by h / (1 + s^2) up and by s h / (1 + s^2) back. A curve
+        of which more than WIDE_SHARE moves further than WIDEST has no band: first order says nothing of it.
         """
+        known = np.isfinite(self.identified + self.half_width + self.slope) & (self.identified <= end)
+        up = self.half_width
+        upper, lower = (np.column_stack([self.hours, self.identified + side * up]) for side in (1.0, -1.0))
         if self.logarithmic:
-            factor = np.exp(np.minimum(self.half_width, 50.0))
-            low, grows = self.identified / factor, not (np.diff(self.identified) < 0).any()
-            return np.fmax.accumulate(low) if grows else low, self.identified * factor
-        return self.identified - self.half_width, self.identified + self.half_width
+            up = self.half_width / (1.0 + np.square(self.slope))
+            near = up * np.sqrt(1.0 + np.square(self.slope)) <= np.log(WIDEST)
+            known &= near & ((known & ~near).sum() <= WIDE_SHARE * known.sum())
+            up = np.where(known, up, 0.0)
+            upper, lower = (
+                np.column_stack([self.hours * np.exp(-side * self.slope * up), self.identified * np.exp(side * up)])
+                for side in (1.0, -1.0)
+            )
+        runs = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
+        return [np.concatenate([upper[run], lower[run][::-1]]) for run in runs if known[run].all() and run.size > 1]
 
 
 def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: str) -> TestCurve:
     """One output of one test of an identification, as it is drawn."""
     history = fit.histories[test]
-    identified, half_width = curves.of(test, output)
+    identified, half_width, growth = curves.of(test, output)
     used = usable_frames(history, output)
     hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
-    identified, half_width = identified[used], half_width[used]
+    identified, half_width, growth = identified[used], half_width[used], growth[used]
     if not is_logarithmic(output):
-        return TestCurve(hours, measured, identified, half_width, measured - identified, logarithmic=False)
+        return TestCurve(hours, measured, identified, half_width, growth, measured - identified, logarithmic=False)
     offset = fit.tests[test][output].offset
     measured, identified = 100 * (measured - offset), 100 * (identified - offset)
     divisor = np.where(identified > 0, identified, np.nan)
     last = measured[-1] if measured.size else 0.0
     shown = np.where(measured > max(PLOTTED_STRAIN_RATIO * last, 0.0), measured, np.nan)
-    return TestCurve(
-        hours, measured, divisor, 100 * half_width / divisor, 100 * np.log(shown / divisor), logarithmic=True
-    )
+    half_width, slope, residuals = 100 * half_width / divisor, 100 * growth / divisor, 100 * np.log(shown / divisor)
+    return TestCurve(hours, measured, divisor, half_width, slope, residuals, logarithmic=True)
 
 
 def unit_of(output: str) -> str:

@@ -13,17 +13,17 @@ from creepkit.arrays import Floats
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
-from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, listed, number, plural
+from creepkit.reports.blocks import Block, Cell, Items, Paragraph, Table, as_text, listed, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
 from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
-from creepkit.reports.identification import scatter_of_rates
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.terminal import print_table, tell, tell_written
+from creepkit.reports.verdicts import scatter_text, verdict_text
 from creepkit.reports.words import COMPARED
 
 if TYPE_CHECKING:
@@ -54,10 +54,8 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
     blocks: list[Block] = [_table(ranking), Items(_behind(ranking))]
     if any(math.isfinite(one.chi_square) for one in ranking.laws):
         blocks.append(Paragraph(COMPARED["chi-square"], "note"))
-    if ranking.challenges:
-        blocks += [Paragraph("what the tests allow beside the best law:"), Items([*map(str, ranking.challenges)])]
-    if ranking.failed:
-        blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
+    blocks.append(Items([*map(str, ranking.challenges or ())], "what the tests allow beside the best law:"))
+    blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
     if figures is not None and ranking.best.tests:
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
@@ -71,21 +69,20 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
 
 
 def _table(ranking: Ranking) -> Table:
-    rows = [
-        (
-            titled_law(one.fit.law),
-            str(len(one.fit.law.params)),
-            ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(one.fit).items()),
-            scatter_of_rates(one.fit),
-            number(one.excess, 3) if math.isfinite(one.excess) else "–",
-            f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
-            number(one.chi_square, 4),
-            "?" if one.fit.adequacy is None else one.fit.adequacy.verdict_text,
-        )
+    rows: list[dict[str, Cell]] = [
+        {
+            "law": titled_law(one.fit.law),
+            "parameters": str(len(one.fit.law.params)),
+            "mean misfit": ", ".join(f"{name} {spread_text(v)}" for name, v in Description.of(one.fit).items()),
+            "test to test": scatter_text(one.fit.noise_model.rate),
+            "behind": number(one.excess, 3) if math.isfinite(one.excess) else "–",
+            "weight": f"as {one.same_as}" if one.same_as else f"{one.weight:.3f}",
+            "chi-square": number(one.chi_square, 4),
+            "by the noise": verdict_text(one.fit.adequacy),
+        }
         for one in ranking.laws
     ]
-    columns = ("law", "parameters", "mean misfit", "test to test", "behind", "weight", "chi-square", "by the noise")
-    return Table("laws tried, the best first", columns, rows, numeric=(1, 4, 5, 6))
+    return Table.of("laws tried, the best first", rows)
 
 
 def _behind(ranking: Ranking) -> list[str]:

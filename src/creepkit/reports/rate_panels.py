@@ -15,7 +15,6 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.records.held_levels import held_temperatures
-from creepkit.reports.blocks import ends
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.description import rejected
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
@@ -255,8 +254,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     measured, _, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
-    over = ends([one.stress for one in rates], 3)
-    return f"exponent, {over} MPa: measured {measured:.2g}, law {predicted:.2g}"
+    return f"stress exponent: measured {measured:.2g}, law {predicted:.2g}"
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
 from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of
+from creepkit.reports.condition_colours import ColourScale
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.words import RUPTURE
@@ -110,39 +111,31 @@ def _tests_text(assessment: RuptureAssessment) -> str:
 def _lives(assessment: RuptureAssessment) -> Table:
     """The times to rupture of the average method."""
     rows = [
-        (
-            f"{one.stress:g}",
-            celsius_text(one.temperature),
-            f"{one.hours:.4g}",
-            *(f"[{a:.3g}, {b:.3g}]" for a, b in (one.bounds_of_mean, one.bounds_of_heat, one.bounds_of_test)),
-            one.extrapolation and f"extrapolated: {one.extrapolation}",
-        )
+        {
+            "stress, MPa": f"{one.stress:g}",
+            "temperature": celsius_text(one.temperature),
+            "median, h": f"{one.hours:.4g}",
+            f"{100 * assessment.settings.level:g} % of the mean": _pair(one.bounds_of_mean, ".3g"),
+            "of a new heat": _pair(one.bounds_of_heat, ".3g"),
+            "of one test": _pair(one.bounds_of_test, ".3g"),
+            "remarks": one.extrapolation and f"extrapolated: {one.extrapolation}",
+        }
         for one in assessment.lives
     ]
-    level = f"{100 * assessment.settings.level:g} %"
-    of = (f"{level} of the mean", "of a new heat", "of one test")
-    columns = ("stress, MPa", "temperature", "median, h", *of, "remarks")
-    return Table("times to rupture in h, with bounds in brackets", columns, rows, numeric=(0, 2))
+    return Table.of("times to rupture in h, with bounds in brackets", rows)
 
 
 def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
     """Methods with their weights and constants, checks and notes, and with `figures` the isotherms."""
     best, relation, groups = assessment.best, assessment.relation, assessment.tests.groups
-    columns = (
-        *("method", "weight", "BIC - best", "scatter of a test"),
-        *(f"between {plural_of(group)}" for group in groups),
-    )
-    rows = [
-        (
-            one.fit.name,
-            f"{one.weight:.3f}",
-            f"{one.excess:.1f}",
-            f"factor {power_of_ten(one.fit.scale_corrected):.3g}",
-            *(f"factor {power_of_ten(scatter):.3g}" for scatter in one.fit.scatter_corrected.values()),
-        )
-        for one in assessment.ranked
-    ]
-    blocks: list[Block] = [Table("methods by their weights", columns, rows, numeric=(1, 2))]
+    rows = []
+    for one in assessment.ranked:
+        found = {f"between {plural_of(group)}": one.fit.scatter_corrected[group] for group in groups}
+        scatter = {"scatter of a test": one.fit.scale_corrected, **found}
+        factors = {name: f"factor {power_of_ten(value):.3g}" for name, value in scatter.items()}
+        row = {"method": one.fit.name, "weight": f"{one.weight:.3f}", "BIC - best": f"{one.excess:.1f}"}
+        rows.append({**row, **factors})
+    blocks: list[Block] = [Table.of("methods by their weights", rows)]
     if figures is not None:
         picture = figures.picture(
             lambda: rupture_figure(assessment),
@@ -158,8 +151,8 @@ def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = 
     if relation is not None:
         blocks += [Paragraph("not ranked, for they use minimum rates:")]
         blocks += [_constants(relation.times), _constants(relation.rates)]
-    blocks += [Paragraph(f"checks of {best.name}:"), Items(list(map(check_text, assessment.checks)))]
-    return [*blocks, Paragraph("notes:"), Items(assessment.notes)] if assessment.notes else blocks
+    checks = Items(list(map(check_text, assessment.checks)), f"checks of {best.name}:")
+    return [*blocks, checks, Items(assessment.notes, "notes:")]
 
 
 def check_text(check: AssessmentCheck) -> str:
@@ -172,7 +165,7 @@ def _constants(fit: RuptureFit) -> Table:
     given = "".join(f", {name} = {value:.6g} given" for name, value in fit.fixed.items())
     rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} to {p.high:.5g}", p.unit) for p in fit.parameters]
     caption = f"{fit.name}: {METHODS[fit.method].equation}{given}"
-    return Table(caption, ("constant", "value", "95 % interval", "unit"), rows, numeric=(1, 2))
+    return Table(caption, ("constant", "value", "95 % interval", "unit"), rows)
 
 
 def _effect_lines(fit: RuptureFit) -> list[str]:
@@ -190,26 +183,25 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
 
 def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
     """The strengths of the average method, and what is said of a new heat, "" for nothing."""
-    level = f"{100 * assessment.settings.level:g} %"
     shown = [one for one in assessment.strengths if one.method == "average"]
     if assessment.relation is not None:
         shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
     scattering = [g for g in assessment.tests.groups if _largest_scatter(assessment, g) >= LEAST_SCATTER_SHOWN]
-    heads = ["method", "temperature", "time, h", "value", f"{level} of the mean"]
-    heads += [f"of a new {' and '.join(scattering)}"] if scattering else []
     rows = []
     for one in shown:
-        bounds = [one.bounds_of_mean, *([one.bounds_of_heat] if scattering else []), one.bounds_of_test]
         remarks = (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason)
+        new_heat = {f"of a new {' and '.join(scattering)}": _pair(one.bounds_of_heat)} if scattering else {}
         rows.append(
-            (
-                one.method,
-                celsius_text(one.temperature),
-                f"{one.hours:g}",
-                "none" if one.value is None else f"{one.value:.1f}",
-                *map(_pair, bounds),
-                "; ".join(text for text in remarks if text),
-            )
+            {
+                "method": one.method,
+                "temperature": celsius_text(one.temperature),
+                "time, h": f"{one.hours:g}",
+                "value": "none" if one.value is None else f"{one.value:.1f}",
+                f"{100 * assessment.settings.level:g} % of the mean": _pair(one.bounds_of_mean),
+                **new_heat,
+                "of one test": _pair(one.bounds_of_test),
+                "remarks": "; ".join(text for text in remarks if text),
+            }
         )
     note = ""
     if not assessment.tests.groups:
@@ -217,9 +209,7 @@ def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
     elif not scattering:
         groups = " and ".join(map(plural_of, assessment.tests.groups))
         note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
-    columns = [*heads, "of one test", "remarks"]
-    caption = "creep rupture strengths in MPa, with bounds in brackets"
-    return Table(caption, columns, rows, numeric=(2, 3)), note
+    return Table.of("creep rupture strengths in MPa, with bounds in brackets", rows), note
 
 
 def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
@@ -230,8 +220,8 @@ def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
     return max(fit.scatter.get(group, 0.0) for fit in fits)
 
 
-def _pair(ends: tuple[float | None, float | None]) -> str:
-    low, high = ("none" if end is None else f"{end:.1f}" for end in ends)
+def _pair(ends: tuple[float | None, float | None], digits: str = ".1f") -> str:
+    low, high = ("none" if end is None else f"{end:{digits}}" for end in ends)
     return f"[{low}, {high}]" if (low, high) != ("none", "none") else "none"
 
 
@@ -295,41 +285,36 @@ def rupture_figure(assessment: RuptureAssessment) -> Figure:
     grid = figure.add_gridspec(2, 2, width_ratios=[1.7, 1.0])
     places = (grid[:, 0], grid[0, 1], grid[1, 1])
     isotherms, master, compared = map(figure.add_subplot, places)
-    colours = _colours(assessment)
     draw_isotherms(isotherms, assessment)
-    _draw_master_curve(master, assessment, colours)
-    _draw_predicted(compared, assessment, colours)
+    _draw_master_curve(master, assessment)
+    _draw_predicted(compared, assessment)
     handles, labels = isotherms.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=8)
     figure.suptitle(wrapped(assessment.verdict, 12.5), fontsize=10)
     return figure
 
 
-def _colours(assessment: RuptureAssessment) -> dict[float, Any]:
-    """{isotherm, K: its colour}."""
-    from matplotlib import colormaps
+def _draw_tests(axes: Axes, tests: RuptureTests, x: Floats, y: Floats, size: float) -> None:
+    """The tests in the colours of their temperatures, run-outs as arrows; x, y : (tests,) their places."""
+    colours = _colours(tests)
+    for k, (T, censored) in enumerate(zip(tests.temperature, tests.censored, strict=True)):
+        marker, ms, edge = (RUN_OUT, 9.0, colours(T)) if censored else ("o", size, "white")
+        axes.plot(x[k], y[k], ls="", marker=marker, ms=ms, color=colours(T), mec=edge, mew=0.4, zorder=5)
 
-    isotherms = assessment.tests.isotherms
-    return {T: colormaps["plasma"](0.78 * k / max(len(isotherms) - 1, 1)) for k, T in enumerate(isotherms)}
 
-
-def _draw_tests(axes: Axes, tests: RuptureTests, x: Floats, y: Floats, colours: dict[float, Any], size: float) -> None:
-    """The tests in the colours of their isotherms, run-outs as arrows; x, y : (tests,) their places."""
-    nearest = [min(colours, key=lambda T: abs(T - one)) for one in tests.temperature]
-    for k, (T, censored) in enumerate(zip(nearest, tests.censored, strict=True)):
-        marker, ms, edge = (RUN_OUT, 9.0, colours[T]) if censored else ("o", size, "white")
-        axes.plot(x[k], y[k], ls="", marker=marker, ms=ms, color=colours[T], mec=edge, mew=0.4, zorder=5)
+def _colours(tests: RuptureTests) -> ColourScale:
+    return ColourScale("temperature, K", tests.temperature, colour_map="plasma")
 
 
 def draw_isotherms(axes: Axes, assessment: RuptureAssessment) -> None:
     """Isotherms with their bounds, and the tests."""
-    colours, tests = _colours(assessment), assessment.tests
+    tests = assessment.tests
     longest = 10.0 ** float(tests.log_time.max())
     hours = 10.0 ** float(tests.log_time.min()) / 2.0, max(3.0 * LONGEST_EXTRAPOLATION * longest, LONGEST_HOURS)
     stresses = 0.6 * float(tests.stress.min()), 1.3 * float(tests.stress.max())
     for T in tests.isotherms[:: -(-len(tests.isotherms) // MOST_ISOTHERMS)]:
-        _draw_isotherm(axes, assessment, T, stresses, hours, colours[T])
-    _draw_tests(axes, tests, 10.0**tests.log_time, tests.stress, colours, 4.0)
+        _draw_isotherm(axes, assessment, T, stresses, hours, _colours(tests)(T))
+    _draw_tests(axes, tests, 10.0**tests.log_time, tests.stress, 4.0)
     axes.axvspan(LONGEST_EXTRAPOLATION * longest, 2 * hours[1], color="#d9d9d9", alpha=0.6, lw=0, zorder=0)
     span(axes, "x", hours, logarithmic=True, most=8)
     span(axes, "y", stresses, logarithmic=True, most=8)
@@ -381,7 +366,7 @@ def _points(stress: Floats, temperature: float, limit: float) -> Conditions:
     return Conditions(stress, np.full(shape, temperature), np.full(shape, limit), np.full(shape, np.nan))
 
 
-def _draw_master_curve(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
+def _draw_master_curve(axes: Axes, assessment: RuptureAssessment) -> None:
     """Stress over the time-temperature parameter of the best fit; of Wilshire's the normalised stress."""
     fit, tests = assessment.best, assessment.tests
     at, T = conditions_of(tests, assessment.tensile), float(tests.temperature.mean())
@@ -389,7 +374,7 @@ def _draw_master_curve(axes: Axes, assessment: RuptureAssessment, colours: dict[
     value, label = _parameter(assessment, at, tests.log_time)
     scale = at.tensile_strength if normalised else np.ones_like(at.stress)
     stress, unit = at.stress / scale, limit if normalised else 1.0
-    _draw_tests(axes, tests, value, stress, colours, 3.5)
+    _draw_tests(axes, tests, value, stress, 3.5)
     grid = np.geomspace(stress.min(), stress.max(), POINTS)
     points = _points(grid * unit, T, limit)
     axes.plot(_parameter(assessment, points, fit.location(points))[0], grid, color="black", lw=1.2)
@@ -419,9 +404,9 @@ def _parameter(assessment: RuptureAssessment, at: Conditions, log_time: Floats) 
     return log_time, "log t, h"
 
 
-def _draw_predicted(axes: Axes, assessment: RuptureAssessment, colours: dict[float, Any]) -> None:
+def _draw_predicted(axes: Axes, assessment: RuptureAssessment) -> None:
     fit, tests = assessment.best, assessment.tests
     measured, predicted = 10.0**tests.log_time, 10.0 ** fit.location(conditions_of(tests, assessment.tensile))
     draw_parity(axes, measured, predicted, logarithmic=True, margin=1.8, factor=BAND_FACTOR)
-    _draw_tests(axes, tests, measured, predicted, colours, 3.5)
+    _draw_tests(axes, tests, measured, predicted, 3.5)
     _dress(axes, "measured, h (grey: a factor of 2)", "predicted, h", f"{fit.name}: predicted against measured")

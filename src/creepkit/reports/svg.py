@@ -32,6 +32,10 @@ MOST_MARKS, FEW_MARKS = 3000, 300
 measured points."""
 
 
+FEW_DOTS = 8
+"""Dots up to which each is a mark of its own."""
+
+
 _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "creepkit",
@@ -140,7 +144,11 @@ def _thin(figure: Figure, artists: Sequence[Any]) -> None:
         for line in (one for one in lines if one.get_linestyle() in ("None", "none", " ", "")):
             points = np.column_stack([line.get_xdata(orig=False), line.get_ydata(orig=False)])
             shown = line.get_transform().transform(points) * (72.0 / float(figure.dpi))
-            line.set_data(*points[kept_dots(shown, max(0.5 * float(line.get_markersize()), 1.0))].T)
+            kept = points[kept_dots(shown, max(0.5 * float(line.get_markersize()), 1.0))]
+            if line.get_marker() == "." and len(kept) > FEW_DOTS and line.axes is not None:
+                line.axes.add_artist(_dots(line, kept))
+                kept = kept[:0]
+            line.set_data(*kept.T)
         for band in bands:
             shape = band.get_transform()
             paths = [shape.transform_path(Path(path.vertices)).cleaned(simplify=True) for path in band.get_paths()]
@@ -149,6 +157,18 @@ def _thin(figure: Figure, artists: Sequence[Any]) -> None:
     for one, count in counts.items():
         if sum(counts.values()) > MOST_MARKS and count > FEW_MARKS:
             one.set_rasterized(True)
+
+
+def _dots(line: Any, points: Floats) -> Any:
+    """One path with a round stroke of no length for each dot of a line, a quarter of the bytes of a mark each."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    path = Path(np.repeat(points, 2, axis=0), np.tile([Path.MOVETO, Path.LINETO], len(points)))
+    path.should_simplify = False
+    width = 0.5 * float(line.get_markersize()) + float(line.get_markeredgewidth())
+    look = {"color": line.get_markerfacecolor(), "alpha": line.get_alpha(), "zorder": line.get_zorder()}
+    return PathPatch(path, fill=False, lw=width, capstyle="round", transform=line.get_transform(), **look)
 
 
 def kept_dots(points: Floats, size: float) -> Bools:
@@ -175,6 +195,7 @@ def _compact(root: ElementTree.Element, identifier: str) -> None:
                 element.set("id", names[value])
             elif name == "style":
                 style = re.sub(r"font:\s*([a-z]+\s+|\d00\s+)*([\d.]+px)[^;]*", r"font-size:\2", value)
+                style = re.sub(r"font-family:[^;]*;?", "", style)  # that of the figure
                 style = re.sub(r"\s*([:;])\s*", r"\1", style).strip(";")
                 element.set("class", styles.setdefault(style, f"{identifier}c{len(styles)}"))
             elif name in (f"{_XLINK}href", "clip-path"):
@@ -182,7 +203,10 @@ def _compact(root: ElementTree.Element, identifier: str) -> None:
                 element.set(name.removeprefix(_XLINK), href)
             elif name != "id" and not value.startswith("rotate(-0 "):
                 value = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda found: f"{float(found[0]):.1f}".removesuffix(".0"), value)
-                element.set(name, re.sub(r"\s*([A-Za-z])\s+|\s*\n\s*", r"\1", value).strip() if name == "d" else value)
+                if name == "d":
+                    value = re.sub(r"\s*([A-Za-z])\s+|\s*\n\s*", r"\1", value).strip()
+                    value = re.sub(r"M([^A-Z]+)L\1(?![^MA-Z])", r"M\1h0", value)  # dots
+                element.set(name, value)
     _without_groups(root)
     sheet = ElementTree.Element("style")
     sheet.text = "".join(f".{name}{{{style}}}" for style, name in styles.items())

@@ -13,7 +13,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
 from creepkit.records.units import celsius_text
-from creepkit.reports.answer import equations, unit_text, value_cells
+from creepkit.reports.answer import equations, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
 from creepkit.reports.description import rejected
 from creepkit.reports.figures import panel_grid, place_legend, span
@@ -144,12 +144,11 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     chosen = ", ".join(f"{parameter} {form}" for parameter, form in law.forms.items())
     found = f"found from {count} temperatures, {celsius_text(low, high)}, and valid between them"
     blocks.append(Paragraph(f"{found}: the parameters follow these forms best: {chosen}; T_ref = {law.T_ref:.2f} K"))
+    said = "the law does not fit" if rejected(law) else ""
     rows = [
-        (e.name, *value_cells(law.law, e), unit_text(e.unit), "the law does not fit" if rejected(law) else e.verdict)
-        for e in law.estimates
+        {"parameter": e.name, **value_cells(law.law, e), "by these tests": said or e.verdict} for e in law.estimates
     ]
-    columns = ("parameter", "value", "95 % interval", "unit", "by these tests")
-    blocks.append(Table("values of the temperature law", columns, rows, numeric=(1, 2)))
+    blocks.append(Table.of("values of the temperature law", rows))
     if figures is not None:
         picture = figures.picture(
             lambda: temperature_law_figure(law),
@@ -163,7 +162,7 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     forms = [(name, ", ".join(map(_form_text, weights))) for name, weights in law.plausible_forms.items()]
     caption = f"forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]})"
     blocks += [Table(caption, ("parameter", "forms with their weights"), forms), _combinations(law)]
-    return [*blocks, Items(law.notes)] if law.notes else blocks
+    return [*blocks, Items(law.notes)]
 
 
 def _form_text(form: FormWeight) -> str:
@@ -175,17 +174,17 @@ def _form_text(form: FormWeight) -> str:
 def _combinations(law: TemperatureLaw) -> Table:
     """The best combinations: forms, numbers, criterion less the best, weight."""
     rows = [
-        (
-            ", ".join(f"{name}:{form}" for name, form in one.forms.items()),
-            str(len(one.values)),
-            f"{one.criterion_difference:.1f}",
-            f"{one.weight:.3f}",
-        )
+        {
+            "forms": ", ".join(f"{name}:{form}" for name, form in one.forms.items()),
+            "numbers": str(len(one.values)),
+            "criterion - best": f"{one.criterion_difference:.1f}",
+            "weight": f"{one.weight:.3f}",
+        }
         for one in law.candidates[:MAX_COMBINATIONS_LISTED]
     ]
     more = len(law.candidates) - MAX_COMBINATIONS_LISTED
     caption = f"combinations, the best first{f'; {more} more are not listed' if more > 0 else ''}"
-    return Table(caption, ("forms", "numbers", "criterion - best", "weight"), rows, numeric=(1, 2, 3))
+    return Table.of(caption, rows)
 
 
 def temperature_study_text(study: TemperatureStudy) -> str:
@@ -203,7 +202,7 @@ def study_blocks(study: TemperatureStudy, figures: PageFigures, of: str = "") ->
         blocks.append(Paragraph(f"the law {fit.adequacy}; what follows are values and trends of that law alone"))
     blocks += [] if law is None else law_blocks(law, figures, of)
     blocks += [] if study.moduli_fit is None else [Verbatim("Young's modulus", str(study.moduli_fit))]
-    return [*blocks, Items(study.notes)] if study.notes else blocks
+    return [*blocks, Items(study.notes)]
 
 
 def modulus_estimates_text(estimates: ModulusEstimates) -> str:

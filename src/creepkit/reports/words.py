@@ -8,15 +8,15 @@ from __future__ import annotations
 
 HEADLINES = {
     # everything that was measured is predicted within a factor of 2
-    "use": "use {law} for {good}; {truth}",
+    "use": "use {law}: on average it fits {good}; {truth}",
     # some of it is, some is not
-    "use in part": "use {law} for {good}, not {bad}; {truth}",
+    "use in part": "use {law} in part: on average it fits {good}, but misses {bad}; {truth}",
     # everything is, but the tests reject the law
-    "between": "use {law} between the tests only, for {good}; {truth}",
+    "between": "use {law} between the tests only: on average it fits {good}; {truth}",
     # some is, and they reject it
-    "between in part": "use {law} between the tests only, for {good}, not {bad}; {truth}",
+    "between in part": "use {law} between the tests only: on average it fits {good}, but misses {bad}; {truth}",
     # nothing is
-    "use nothing": "do not use {law}: it misses {bad}; {truth}",
+    "use nothing": "do not use {law}: on average it misses {bad}; {truth}",
     # nothing can be compared, as of fields alone
     "fitted": "{law} was fitted; {truth}",
     # the search did not converge
@@ -25,15 +25,19 @@ HEADLINES = {
 """{kind: the first line of an answer}."""
 
 
+FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
+"""What was measured, with the root mean square of predicted over measured in the fitted tests."""
+
+
 TRUTHS = {
     # no noise is stated, and too few readings show it
-    "not judged": "whether it is true is unknown",
+    "not judged": "whether it is the exact law cannot be judged",
     # the p-value is 0.3 % or more
     "explains": "the tests do not reject it",
     # what it misses lies in single tests, or in two groups of them (their sentence follows)
     "in tests": "{cause}",
     # any other misfit beyond the noise; why stands in the first caution
-    "rejected": "the tests reject it",
+    "rejected": "the tests reject it as the exact law",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
@@ -46,7 +50,7 @@ CAUTIONS = {
     # an answer from a file says nothing of it
     "unknown": "whether the tests reject the law is not known",
     # they do; why follows, the first of REASONS that holds
-    "rejected": "the tests reject it as the exact law: {reason}",
+    "rejected": "it is not exact: {reason}",
     # a simulation ends before a reading, or gives no number
     "unpredicted": "it does not predict every reading of {tests}",
     # a thickness, offset or drift of usual size takes the rejection away
@@ -102,7 +106,7 @@ NEXT = {
     # laws have weights of 0.05 or more, and bars can tell them apart
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     # bars cannot
-    "separate otherwise": "{first} and {second} need a test apart (creepkit design)",
+    "separate otherwise": "make a test that tells {first} from {second} (creepkit design)",
     # the law above a threshold stress explains the tests as well
     "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
@@ -120,10 +124,14 @@ NEXT = {
 
 
 BRACKETS = (
-    "In brackets: 95 % intervals; those of forecasts and lives are for one new test. "
-    "The mean misfit is over the tests that were fitted."
+    "In brackets: 95 % intervals, of what one new test may show where this is said. "
+    "The misfit of the headline is the mean of the fitted tests, not that of a forecast."
 )
 """Below the numbers of an answer."""
+
+
+NEW_TEST = "{condition}, one new test"
+"""Where a number holds whose interval has the scatter between tests in it."""
 
 
 ALL_DIGITS = "all digits{more}: details"
@@ -203,7 +211,9 @@ FORECAST = {
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a rejected law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}; intervals allow for {here} here",
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}{allowed}",
+    # its end, where that is more than nothing
+    "allowed": "; intervals allow for {here} here",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
@@ -230,7 +240,9 @@ DESIGN = {
     # as it says
     "one law": "no test is proposed: {law} remains alone, and nothing is to be told apart from it",
     # all are left out
-    "none": "no test can be made: there are only candidates {reasons}",
+    "none": "no test can be made within these limits: of {count} candidates {reasons}",
+    # there are no candidates
+    "nothing": "no test can be made: none lies within the loads, durations and temperatures that were stated",
     # the goal is the law
     "decides": "it decides between the laws with probability {probability}",
     # a quantity
@@ -249,7 +261,13 @@ DESIGN = {
     "next contradicted": "find a law that the tests do not reject, or design for the values (--goal parameters)",
     # none is
     "next one law": "design for the values, or for a rate or an exponent (--goal parameters, rate, exponent)",
-    # none can be made
+    # none can be made, most would rupture
+    "next would rupture": "allow lower loads, shorter or colder tests (--levels, --longest-h, --temperature-c)",
+    # so they would
+    "next would grow too far": "allow lower loads or shorter tests (--levels, --longest-h)",
+    # their outputs stay within the noise
+    "next would hardly grow": "allow higher loads, longer or hotter tests (--levels, --longest-h, --temperature-c)",
+    # there are no candidates
     "next none": "state what the rig can do: loads, durations, temperatures (creepkit design --help)",
 }
 """{kind: what a design of further tests says}, its first line, what it tells, and what to do next."""

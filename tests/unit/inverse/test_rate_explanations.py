@@ -13,6 +13,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.uncertainty.rate_scatter import log_prior, rate_scatter
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.reports.answer import cautions
+from creepkit.reports.verdicts import cause_headline
 
 HOUR, T_REF = 3600.0, 873.15
 STEEL = [(s, T) for T, levels in ((575, (110, 140, 170, 200)), (600, (95, 120, 150, 180))) for s in levels]
@@ -82,7 +83,7 @@ def test_a_strain_in_another_unit_is_found_by_its_factor():
     first = fit.adequacy.explanations[0]
     assert (first.kind, first.tests) == ("one test", ("test_5",))
     assert 1 / first.errors["strain"] == pytest.approx(100.0, rel=0.25)
-    assert "nearly 100: a unit?" in first.sentence
+    assert "nearly 100: a unit?" in str(first)
 
 
 def test_two_materials_are_told_by_their_rates():
@@ -101,7 +102,7 @@ def test_a_label_that_splits_the_tests_as_their_rates_do_is_named_with_the_facto
     first = fit.adequacy.explanations[0]
     assert (first.kind, {first.label, first.beside}) == ("two groups", {"heat A", "heat B"})
     assert np.exp(abs(first.size)) == pytest.approx(3.0, rel=0.15)
-    assert first.headline.startswith("heat B creeps ")
+    assert cause_headline(first).startswith("heat B creeps ")
     assert "identify each heat apart" in str(fit)
 
 

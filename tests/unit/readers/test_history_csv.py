@@ -214,8 +214,7 @@ def test_round_trip(history: History, tmp_path: Path):
     path = write_history(history, tmp_path / "x.csv")
     (back,) = HISTORY_CSV.read(path)
     assert_same(history, back)
-    assert (back.source, history_text(back)) == (str(path), path.read_text())
-    assert names_in(tmp_path) == ["x.csv"]
+    assert (back.source, history_text(back), names_in(tmp_path)) == (str(path), path.read_text(), ["x.csv"])
 
 
 def test_modulus_of_temperature_is_written_at_the_temperature_of_the_test(tmp_path):

@@ -22,7 +22,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import History, Program, constant_stress
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
-from creepkit.reports.prediction_bands import fitted_curves, joint_covariance
+from creepkit.reports.prediction_bands import curve_of_test, fitted_curves, joint_covariance
 from creepkit.reports.ranking import MOST_TESTS_DRAWN, misfit_name, misfits
 from creepkit.reports.rate_panels import own_rates
 from creepkit.reports.svg import svg_text
@@ -102,15 +102,17 @@ def fit():
 def test_the_band_of_a_norton_bar_is_that_of_its_rate(fit):
     """strain = A s^n t: ln strain has the standard deviation of ln rate at that stress, at every time."""
     curves, quantile = fitted_curves(fit), NORMAL_QUANTILE
-    jacobian = fit.coordinates.jacobian(fit.u)  # of (ln A, n) to u
     for k, stress in enumerate(STRESSES):
-        to_log_rate = np.array([1.0, np.log(stress)]) @ jacobian
+        to_log_rate = np.array([1.0, np.log(stress)]) @ fit.coordinates.jacobian(fit.u)  # of (ln A, n) to u
         sd = np.sqrt(to_log_rate @ fit.covariance @ to_log_rate)
-        curve, half_width = curves.of(k, "strain")
+        curve, half_width, growth = curves.of(k, "strain")
         strain = curve - fit.tests[k].offset
-        np.testing.assert_allclose(half_width / strain, quantile * sd, rtol=1e-4)
+        np.testing.assert_allclose(growth / strain, 1.0, rtol=1e-6)
+        (outline,) = curve_of_test(fit, curves, k, "strain").bands()  # across a straight curve its edges are the same
+        moved = np.log(outline[:, 1] / outline[:, 0] / (360000.0 * strain / fit.histories[k].times)[0])
         _, low, high = fit.rate(stress, 1050.0)
-        np.testing.assert_allclose(0.5 * np.log(high / low), quantile * sd, rtol=1e-4)
+        widths = [*(half_width / strain), *np.abs(moved), float(0.5 * np.log(high / low))]
+        np.testing.assert_allclose(widths, quantile * sd, rtol=1e-4)
 
 
 def test_a_test_shows_its_own_rate(fit):

@@ -157,13 +157,10 @@ def test_hostile_names_are_shown_as_text() -> None:
     assert "<script>alert(1)</script>" in words
     assert "onerror=alert(1)>]]></style></svg><!--" in words
     assert "{{ 7 * 7 }} &amp;" in words
-    assert "\u202e" not in html
-    assert "\x07" not in html
-    assert "\x00" not in html
+    assert not {"\u202e", "\x07", "\x00"} & set(html)
     assert max(map(len, words.splitlines())) < 5000
     names = [e.get("download", "") for e in elements(parsed(html)) if tag(e) == "a" and e.get("download")]
-    assert names
-    assert all(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*", name) for name in names)
+    assert {bool(re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*", name)) for name in names} == {True}
 
 
 def test_what_failed_is_said_and_the_rest_is_there() -> None:

@@ -34,7 +34,7 @@ def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
     early = ck.identify("norton", bars(lambda x: x + 0.5 * (1 - np.exp(-10 * x))))
     assert law_to_try(early, []) == ("norton*primary", "early")
     assert law_to_try(early, ["norton*primary"]) == ("strain-hardening", "early")
-    assert "norton between the tests only, for " in early.headline
+    assert "norton between the tests only: on average it fits " in early.headline
     assert next_step(early, searched=[one.format(law="norton") for one in LACKING["early"]]) == NEXT["within"]
     late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
     assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")

@@ -178,4 +178,4 @@ def test_a_history_of_relaxation_survives_its_file(tmp_path):
     (again,) = ck.read_histories(write_history(run, tmp_path / "held.csv"))
     assert (again.specimen, again.loading, again.elastic) == ("relaxation", loading, ck.Elastic(E))
     assert again.outputs["stress"].tolist() == run.outputs["stress"].tolist()
-    assert again.condition == "20 °C, strain 0.001 to 0.0012"
+    assert again.condition == "20 °C, 0.1 to 0.12 % strain"

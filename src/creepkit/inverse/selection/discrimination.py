@@ -15,7 +15,8 @@ is the chi-square between their predictions: if one of them is true, the other i
 `off` value (m = 0) is equivalent too where the parameter's interval contains it.
 
 A law of more parameters whose values make it the same function as a simpler one over the tests, their rates within 5 %
-of one another, is no other answer: the simpler law, where it has more evidence, stands for both.
+of one another by values that the simpler one may take, is no other answer: the simpler law, where it has more evidence,
+stands for both.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import Perturbation
-from creepkit.inverse.sparsity.term_selection import TermContributions
+from creepkit.inverse.sparsity.term_selection import DIFFERENCE_STEP, TermContributions
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem
@@ -140,6 +141,16 @@ def same_function(first: Floats, second: Floats) -> bool:
     return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
 
 
+def _nearest_of(log_rate: Callable[[Floats], Floats], u: Floats, other: Floats) -> Floats:
+    """(points,) ln of the rate of a law whose values, u (parameters,) at first, come nearest to another (points,)."""
+    own = log_rate(u)
+    steps = DIFFERENCE_STEP * np.eye(u.size)
+    slopes = np.column_stack([(log_rate(u + h) - log_rate(u - h)) / (2.0 * DIFFERENCE_STEP) for h in steps])
+    if not np.isfinite([*slopes.ravel(), *own, *other]).all():
+        return own
+    return np.asarray(own + slopes @ np.linalg.lstsq(slopes, other - own)[0])
+
+
 class RatesOverTests:
     """The rates of identified laws over their tests, by which a simpler one stands for others.
 
@@ -164,7 +175,8 @@ class RatesOverTests:
         sizes, stands = [fit.u.size for fit in self.fits], list(range(len(self.fits)))
         for k in sorted(stands, key=lambda law: sizes[law]):
             simpler = [j for j, size in enumerate(sizes) if size < sizes[k] and scores[j] <= scores[k]]
-            same = [j for j in simpler if same_function(log_rates[j], log_rates[k])]
+            nearest = {j: _nearest_of(self.log_rates[j], u[j], log_rates[k]) for j in simpler}
+            same = [j for j in simpler if same_function(nearest[j], log_rates[k])]
             stands[k] = stands[min(same, key=lambda law: float(scores[law]), default=k)]
         return stands
 

@@ -79,29 +79,23 @@ class Ranking(Presentable, Plotted, Tabulated):
         return self.best.valued.replace(notes=tuple(self.best.comments(self)))
 
     @property
-    def unmet(self) -> Mapping[str, str]:
-        """{condition of a decisive answer that is not met: why, in words}, most telling first.
+    def unmet(self) -> tuple[str, ...]:
+        """Conditions of a decisive answer that are not met, most telling first.
 
         "alternatives": two laws or more were fitted. "convergence": of the values of the best one. "adequacy": it
         explains the tests, with nuisances of plausible size. "weight": it has more than 95 %. "asked": it was asked
         for. "challenges": it stands every one.
         """
-        adequacy, unmet = self.adequacy, dict[str, str]()
-        if len(self.laws) == 1:
-            unmet["alternatives"] = f"only {self.best.law.name} was fitted"
-        if not self.best.converged:
-            unmet["convergence"] = "the search for its values did not converge"
-        if adequacy is None or not adequacy.explains_plausibly:
-            unmet["adequacy"] = self.adequacy_text
-        if not self.laws[0].weight > DECISIVE_WEIGHT:
-            unmet["weight"] = f"its weight is not above {DECISIVE_WEIGHT:g}"
-        if self.best.law.name in self.further:
-            unmet["asked"] = "it is none of the laws asked for"
-        if self.challenges is None:
-            unmet["challenges"] = "what else the tests allow was not examined"
-        elif refuting := [challenge.sentence for challenge in self.challenges if challenge.refutes]:
-            unmet["challenges"] = "; and ".join(refuting)
-        return unmet
+        refuted = self.challenges is None or any(challenge.refutes for challenge in self.challenges)
+        conditions = {
+            "alternatives": len(self.laws) > 1,
+            "convergence": self.best.converged,
+            "adequacy": self.adequacy is not None and self.adequacy.explains_plausibly,
+            "weight": self.laws[0].weight > DECISIVE_WEIGHT,
+            "asked": self.best.law.name not in self.further,
+            "challenges": not refuted,
+        }
+        return tuple(name for name, is_met in conditions.items() if not is_met)
 
     @property
     def decisive(self) -> bool:
@@ -119,11 +113,6 @@ class Ranking(Presentable, Plotted, Tabulated):
         return self.best.adequacy
 
     @property
-    def adequacy_text(self) -> str:
-        """What the tests say of the best law, in words that begin with "it"."""
-        return "whether the tests reject it is not known" if self.adequacy is None else f"it {self.adequacy}"
-
-    @property
     def credible(self) -> tuple[RankedLaw, ...]:
         """The laws that the tests cannot rule out: weight above 5 %."""
         return tuple(r for r in self.laws if r.weight > CREDIBLE_WEIGHT)
@@ -131,24 +120,9 @@ class Ranking(Presentable, Plotted, Tabulated):
     @property
     def verdict(self) -> str:
         """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
-        unmet, best = self.unmet, self.best.law.name
-        if "alternatives" in unmet:
-            return f"{unmet['alternatives']}; {self.adequacy_text}"
-        same = f"; {self.same_functions}" if self.same_functions else ""
-        if not unmet:
-            allowed = "".join(f"; but {challenge}" for challenge in self.challenges or ())
-            return f"decisive: {best}, of {len(self.laws)} laws tried; {self.adequacy_text}{same}{allowed}"
-        return f"not decisive: {_reason(self, unmet)}{same}"
+        from creepkit.reports.verdicts import ranking_verdict
 
-    @property
-    def same_functions(self) -> str:
-        """Which laws the best one stands for, in a clause; "" where none."""
-        names = [ranked.fit.law.name for ranked in self.laws if ranked.same_as == self.best.law.name]
-        has, function = (
-            "with its values is" if len(names) == 1 else "with their values are",
-            "the same function over the tests",
-        )
-        return f"{' and '.join(names)} {has} {function}" if names else ""
+        return ranking_verdict(self)
 
     @property
     def model_average(self) -> ModelAverage:
@@ -194,38 +168,6 @@ class Ranking(Presentable, Plotted, Tabulated):
         from creepkit.reports.answer import answer_text
 
         return answer_text(self.best, self)
-
-
-def _reason(ranking: Ranking, unmet: Mapping[str, str]) -> str:
-    """Why a ranking of several laws is not decisive."""
-    names, best, count = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, len(ranking.laws)
-    lost = f"; {unmet['convergence']}" if "convergence" in unmet else ""
-    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried{lost}"
-    named = unmet.get("challenges", "") if ranking.challenges else ""
-    if adequacy is not None and adequacy.rejects:
-        if adequacy.lies_in_tests:
-            first = adequacy.explanations[0].headline
-            return f"of {count} laws tried {best} is best ({weight}), but {first}: {adequacy.explanation_text}"
-        others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
-        remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
-        if remedied and not named and not adequacy.remedies:
-            effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
-            others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
-        stated = f" as they are stated; {named}" if named else ""
-        return f"none of {count} laws tried explains the tests{stated}. The best, {best} ({weight}{others}), {adequacy}"
-    if "asked" in unmet and adequacy is not None and adequacy.explains:
-        asked, more = count - len(ranking.further), len(ranking.further)
-        found = f"of {more} more that were tried, {best} is not rejected by them ({weight})"
-        none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
-        return f"{none} the tests; {found}: plan tests that can refute it"
-    if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {ranking.adequacy_text}{lost}"
-        return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; {found}"
-    if named and ranking.singled_out and adequacy is not None:
-        explains = f"is not rejected by the tests{adequacy.qualification}"
-        return f"of {count} laws tried {best} has nearly all the weight ({weight}); it {explains}; but {named}"
-    reasons = dict.fromkeys([ranking.adequacy_text, *(why for name, why in unmet.items() if name != "convergence")])
-    return f"of {count} laws tried {best} is best ({weight}); {'; '.join(reasons)}"
 
 
 @checked
@@ -282,8 +224,10 @@ def challenged(ranking: Ranking) -> Ranking:
     fits = [ranked.fit for ranked in ranking.laws]
     if len(fits) < 2 or any(f.predictor is None or not f.histories for f in fits):
         return ranking
-    _, weights = evidence_weights([ranked.excess for ranked in ranking.laws])
-    found = challenges_of(fits) if ranking.singled_out else explaining_effects(fits, weights)
+    if ranking.singled_out:
+        found = challenges_of([r.fit for r in ranking.laws if r.same_as != ranking.best.law.name])
+    else:
+        found = explaining_effects(fits, evidence_weights([ranked.excess for ranked in ranking.laws])[1])
     return replace(ranking, challenges=found)
 
 

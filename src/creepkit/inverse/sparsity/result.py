@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from scipy.stats import chi2
 
 from creepkit.inverse.goodness_of_fit import OutputErrors
-from creepkit.records.presentable import Presentable
+from creepkit.records.presentable import Presentable, function_of_reports
 
 
 @dataclass(frozen=True)
@@ -75,23 +75,9 @@ class Sparsity(Presentable):
     @property
     def verdict(self) -> str:
         """What was dropped, and what that cost, in one sentence."""
-        dropped = _quoted_list([*self.dropped_terms, *(f"exponent {name}" for name in self.exponents_off)])
-        if not dropped:
-            return f"all terms of '{self.law}' are kept"
-        cost = (
-            f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer "
-            f"(p = {self.p_value:.2g}) and -2 ln of the evidence changes by {self.score_difference:+.1f}"
-        )
-        verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
-        return f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
+        return str(function_of_reports("inference.sparsity_verdict")(self))
 
     shown_by = "inference.sparsity_text"
-
-
-def _quoted_list(names: list[str] | TermNames) -> str:
-    """'a', 'b' and 'c'."""
-    quoted = [f"'{name}'" if not name.startswith("exponent ") else name for name in names]
-    return quoted[0] if len(quoted) == 1 else " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if quoted else ""
 
 
 TermNames = tuple[str, ...]

@@ -27,6 +27,7 @@ from creepkit.reports.histories import history_blocks, quality_blocks
 from creepkit.reports.identified_files import covariance_file
 from creepkit.reports.law_names import definition_blocks
 from creepkit.reports.methods import laws_of, methods_text
+from creepkit.reports.verdicts import explanation_text
 
 if TYPE_CHECKING:
     from creepkit.reports.contents import ExportedFile, ReportContents, ReportGroup
@@ -159,10 +160,8 @@ def _missing_blocks(contents: ReportContents) -> list[Block]:
         *((one.stage, sentence(one.sentence)) for one in contents.failures),
         *((f"identification of {group.name}", sentence(group.failure)) for group in groups),
     ]
-    blocks: list[Block] = []
-    if rows:
-        blocks.append(Table("Stages that failed, and why", ("stage", "reason"), rows))
-    return [*blocks, Items(contents.notes)] if contents.notes else blocks
+    table = [Table("Stages that failed, and why", ("stage", "reason"), rows)] if rows else []
+    return [*table, *([Items(contents.notes)] if contents.notes else [])]
 
 
 # ---- data ------------------------------------------------------------------------------------------------------------
@@ -183,7 +182,7 @@ def data_section(contents: ReportContents) -> PageSection:
     if contents.quality is not None:
         blocks += quality_blocks(contents.quality, MOST_LISTED)
     in_tests = [(one.name, one.fit.adequacy) for one in contents.identified if one.fit.adequacy is not None]
-    texts = [(name, adequacy.explanation_text) for name, adequacy in in_tests if adequacy.lies_in_tests]
+    texts = [(name, explanation_text(adequacy)) for name, adequacy in in_tests if adequacy.lies_in_tests]
     blocks += [Paragraph(f"{name}: {text}" if name else text, "warning") for name, text in texts]
     left_out = _exclusion_blocks(contents) if histories or contents.exclusions else []
     flags = 0 if contents.quality is None else len(contents.quality.flags)

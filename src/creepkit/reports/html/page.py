@@ -24,31 +24,35 @@ from creepkit.reports.blocks import (
     Picture,
     Table,
     Verbatim,
-    number,
+    first_of,
     plural,
     printable,
     printable_lines,
     sentence,
     typeset,
 )
+from creepkit.reports.composition import composition_blocks, map_sentence
 from creepkit.reports.description import rejected, tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
 from creepkit.reports.forecast import forecast_answer, forecast_blocks
 from creepkit.reports.html.closing import MOST_FILES, closing_sections, data_section, files_to_download
 from creepkit.reports.html.templates import resource, template
-from creepkit.reports.identification import blocks_of_tests, noise_blocks, scatter_of_rates, value_blocks, worst_tests
+from creepkit.reports.identification import blocks_of_tests, noise_blocks, value_blocks, worst_tests
 from creepkit.reports.identification_plot import summary_figures
 from creepkit.reports.instrument_records import alignment_text, imposed_text
 from creepkit.reports.law_names import LawNames
+from creepkit.reports.prediction_bands import WIDEST
 from creepkit.reports.ranking import equivalents_among_remaining, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
 from creepkit.reports.temperature_law import law_blocks, study_blocks
+from creepkit.reports.verdicts import scatter_text
 from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
+    from creepkit.discovery.discover import TemperatureStudy
     from creepkit.extraction.extraction import Extraction
     from creepkit.instruments.imposed import Imposed
     from creepkit.reports.contents import ReportContents, ReportGroup
@@ -126,29 +130,33 @@ def block_shown(block: Block, names: LawNames) -> Block:
     if isinstance(block, Paragraph):
         return dataclasses.replace(block, text=said(block.text))
     if isinstance(block, Items):
-        return Items([said(one) for one in block.items])
+        return Items([said(one) for one in block.items], said(block.title) if block.title else "")
     if isinstance(block, Picture):
         return dataclasses.replace(block, caption=typeset(block.caption))
     if isinstance(block, Table):
         table = block.filled
         rows = [cells(row) for row in table.rows]
-        return Table(said(table.caption).removesuffix("."), cells(table.columns), rows, table.numeric)
+        return Table(said(table.caption).removesuffix("."), cells(table.columns), rows)
     if isinstance(block, Answer):
         return dataclasses.replace(
             block,
             headline=said(block.headline),
             tests=typeset(block.tests),
             picture=None if block.picture is None else block_shown(block.picture, names),
-            values=[
-                cells((name, f"{value}{' (at the bound of its search)' * (f'{value} (search bound)' in ends)}", unit))
-                for name, value, ends, unit in block.values
-            ],
+            values=[cells((name, _value_shown(value, ends), unit)) for name, value, ends, unit in block.values],
             figures=[cells(one) for one in block.figures],
             cautions=[said(one) for one in block.cautions],
             next_step=said(block.next_step),
             brackets=said(block.brackets) if block.brackets else "",
         )
     return block
+
+
+def _value_shown(value: str, ends: Sequence[str]) -> str:
+    """A value, with its interval where that is all that is known, or that it lies at a bound of its search."""
+    if not value.startswith("="):
+        return f"{value} [{', '.join(ends)}]"
+    return f"{value}{' (at the bound of its search)' * (f'{value[2:]} (search bound)' in ends)}"
 
 
 # ---- findings --------------------------------------------------------------------------------------------------------
@@ -161,11 +169,10 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
     missing += [f"identification of {printable(g.name, 80)}" for g in contents.groups if g.failure]
     blocks: list[Block] = []
     if missing:
-        listed = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
         reasons = Markup(
             'This report is not complete. Failed: {}. The reasons stand under <a href="#missing">What is missing</a>.'
         )
-        blocks.append(Paragraph(reasons.format(listed), "warning"))
+        blocks.append(Paragraph(reasons.format(first_of(missing, 12)), "warning"))
     if len(found) == 1:
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
         asked += [figure for one in contents.rupture.values() for figure in rupture_figures(one)]
@@ -199,7 +206,8 @@ def group_answer(found: ReportGroup, figures: PageFigures, *, asked: Sequence[Ke
         rupture = ", and times to rupture, predicted over measured" if rupture_rows(fit) else ""
         title = f"The law over the tests{found.of}"
         description = f"Curves of {plural(len(fit.tests), 'test')} over time, creep rate over stress{rupture}."
-        picture = figures.picture(lambda: summary_figures(fit), title, description, f"{title}.")
+        caption = f"{title}. Bands wider than a factor of {WIDEST:g} to either side are not drawn."
+        picture = figures.picture(lambda: summary_figures(fit), title, description, caption)
     return answer(fit, found.ranking, asked=asked, picture=picture, **page)
 
 
@@ -273,7 +281,7 @@ def _sections_of(
         blocks = ranking_blocks(ranking, figures if drawn else None, found.of)
         said = f"best of {plural(len(ranking.laws), 'law')}{none}"
         yield PageSection(f"{prefix}ranking", "Laws compared", blocks, result=said)
-    scatter = f"rates of tests scatter by {scatter_of_rates(fit)}"
+    scatter = f"rates of tests scatter by {scatter_text(fit.noise_model.rate)}"
     said = scatter if len(fit.tests) > 1 else "of the readings of one test"
     yield PageSection(f"{prefix}nuisances", "Noise and nuisance parameters", noise_blocks(fit), result=said)
 
@@ -287,48 +295,27 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
     Strengths stand among the findings where no law was identified, and are not repeated.
     """
 
-    def temperature(one: Any, of: str) -> list[Block]:
-        return law_blocks(one, figures, of) if isinstance(one, TemperatureLaw) else study_blocks(one, figures, of)
-
-    def rupture(one: Any, of: str) -> list[Block]:
+    def rupture(one: Any, figures: PageFigures, of: str) -> list[Block]:
         return [*(strength_blocks(one) if identified else []), *rupture_blocks(one, figures, of)]
 
-    stages: dict[str, tuple[str, Mapping[str, Any], Callable[[Any, str], list[Block]], Callable[[Any], str]]] = {
-        "extraction": (
-            "Extraction from camera frames",
-            contents.extractions,
-            lambda one, of: _extraction_blocks(one, figures, of),
-            lambda one: f"{', '.join(one.outputs)} of {plural(int(one.used.sum()), 'frame')}".replace("_", " "),
-        ),
-        "imposed": (
-            "Loads and temperatures from instrument records",
-            contents.imposed,
-            lambda one, of: _imposed_blocks(one),
-            lambda one: f"lag of the clocks {number(one.alignment.lag, 4)} s",
-        ),
+    records, imposed = "Loads and temperatures from instrument records", contents.imposed
+    stages: dict[str, tuple[str, Mapping[str, Any], Callable[..., list[Block]], Callable[[Any], str]]] = {
+        "extraction": ("Extraction from camera frames", contents.extractions, _extraction_blocks, _outputs_text),
+        "imposed": (records, imposed, _imposed_blocks, lambda one: f"lag of the clocks {one.alignment.lag:.4g} s"),
+        "composition": ("Creep over compositions", contents.composition, composition_blocks, map_sentence),
         "temperature": (
-            *("Trends with temperature", contents.temperature, temperature),
-            lambda one: "how the values change with temperature",
+            "Trends with temperature",
+            contents.temperature,
+            _trends,
+            lambda one: "values over temperature",
         ),
-        "rupture": (
-            *("Rupture", contents.rupture, rupture),
-            lambda one: f"{plural(len(one.ranked), 'method')} compared",
-        ),
-        "forecasts": (
-            "Forecasts",
-            contents.forecasts,
-            lambda one, of: forecast_blocks(one, figures, of),
-            lambda one: forecast_answer(one).headline,
-        ),
-        "design": (
-            "Further tests",
-            contents.design,
-            lambda one, of: design_blocks(one, figures, of),
-            lambda one: one.sentence,
-        ),
+        "rupture": ("Rupture", contents.rupture, rupture, lambda one: f"{plural(len(one.ranked), 'method')} compared"),
+        "forecasts": ("Forecasts", contents.forecasts, forecast_blocks, lambda one: forecast_answer(one).headline),
+        "design": ("Further tests", contents.design, design_blocks, lambda one: one.sentence),
     }
     for identifier, (title, results, blocks_of, said) in stages.items():
-        blocks = [blocks_of(one, f" of {printable(name, 80)}" if name else "") for name, one in results.items()]
+        of = [f" of {printable(name, 80)}" if name else "" for name in results]
+        blocks = [blocks_of(one, figures, name) for one, name in zip(results.values(), of, strict=True)]
         if len(results) == 1:
             yield PageSection(identifier, title, blocks[0], result=said(*results.values()))
         elif results:
@@ -337,6 +324,14 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
                 for k, (name, one) in enumerate(zip(results, blocks, strict=True), start=1)
             ]
             yield PageSection(identifier, title, (), inner, result=f"{len(results)} results")
+
+
+def _trends(one: TemperatureLaw | TemperatureStudy, figures: PageFigures, of: str) -> list[Block]:
+    return law_blocks(one, figures, of) if isinstance(one, TemperatureLaw) else study_blocks(one, figures, of)
+
+
+def _outputs_text(extraction: Extraction) -> str:
+    return f"{', '.join(extraction.outputs)} of {plural(int(extraction.used.sum()), 'frame')}".replace("_", " ")
 
 
 def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) -> list[Block]:
@@ -350,7 +345,7 @@ def _extraction_blocks(extraction: Extraction, figures: PageFigures, of: str) ->
     return [picture, Verbatim("What was extracted, and how well", printable_lines(extraction_text(extraction)))]
 
 
-def _imposed_blocks(under: Imposed) -> list[Block]:
+def _imposed_blocks(under: Imposed, figures: PageFigures, of: str) -> list[Block]:
     """The alignment of the clocks with its interval, and how well programs follow the record."""
     return [
         Verbatim("Alignment of the clocks", printable_lines(alignment_text(under.alignment))),

@@ -15,7 +15,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.selection.challenges import Challenge
-from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.selection.discrimination import _nearest_of, same_function, under_common_covariance
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, _are_outdone, challenged, rank, ranking_from_scores
 from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
 from creepkit.inverse.settings import IdentificationSettings
@@ -69,9 +69,8 @@ def test_a_search_that_did_not_converge_is_repeated(ranking):
 
 def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
     """Creep strain grows a thousandfold over a test: hardening by m changes rates by 1000^m."""
-    ranking = ck.select(
-        LAWS[:2], measured("norton", {"A": 1e-16, "n": 4.2}, seed=2), "uniaxial", nuisances=[], starts=3
-    )
+    tests = measured("norton", {"A": 1e-16, "n": 4.2}, seed=2)
+    ranking = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=3)
     steady, hardening = ranking.laws
     assert 1000.0 ** -hardening.fit.values["m"] < 1.05
     assert (steady.fit.law.name, hardening.same_as, hardening.weight) == ("norton", "norton", 0.0)
@@ -81,11 +80,18 @@ def test_a_law_that_is_a_simpler_one_over_the_tests_counts_as_that_one():
     assert ranking.model_average.weights == pytest.approx([1 / (1 + odds), odds / (1 + odds)])
 
 
+def test_a_power_law_of_other_values_is_the_same_function():
+    """By values that it may take: a factor of 1.01 to 1.04 that grows with stress is a larger exponent."""
+    log_stress = np.linspace(-0.7, 0.7, 9)
+    other = -20.0 + 5.4 * log_stress + np.log(1.025 + 0.01 * log_stress)
+    nearest = _nearest_of(lambda u: u[0] + u[1] * log_stress, np.array([-20.0, 5.5]), other)
+    assert [same_function(rate, other) for rate in (nearest, -20.0 + 5.5 * log_stress)] == [True, False]
+
+
 def test_sums_are_asked_for_by_name():
     values = {"A_1": 2e-17, "n_1": 4.5, "A_2": 1e-16, "n_2": 4.0, "m": -0.5}
     law = ck.law("norton") + ck.law("strain-hardening")
-    tests = measured(law, values)
-    ranking = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=3, sums=True)
+    ranking = ck.select(LAWS[:2], measured(law, values), "uniaxial", nuisances=[], starts=3, sums=True)
     assert ranking.best.law.fingerprint == law.fingerprint
 
 
