@@ -10,6 +10,7 @@ from .api.objects import specimen as specimen
 from .api.saved import load as load
 from .api.simulation import simulate as simulate
 from .app.page import interactive_page as interactive_page
+from .composition.mapping import composition_map as composition_map
 from .dataset.generation import generate as generate
 from .dataset.storage import read_dataset as read_dataset
 from .dataset.storage import write_dataset as write_dataset

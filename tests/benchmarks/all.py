@@ -80,6 +80,7 @@ BENCHMARKS = {
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "noise_correlation": Benchmark(4),
     "conditions": Benchmark(30),
+    "compositional_space": Benchmark(6, short=("--alloys", "10", "--repeats", "2")),
     "law_search": Benchmark(45, (("--laws", "13"),), short=("--laws", "1", "--budget", "10")),
     "law_search_outside": Benchmark(15, short=("--truths", "mechanisms in series", "--budget", "10")),
     "law_search_measured": Benchmark(6, needs=f"{DATA}; gplearn 0.4.3 elsewhere, with --gplearn PYTHON"),

@@ -17,11 +17,12 @@ BUDGET = {
     "api": 285,
     "app": 596,
     "cameras": 823,
-    "cli": 2127,
+    "cli": 2135,
+    "composition": 370,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
-    "experiments": 1271,
+    "experiments": 1270,
     "exporters": 2680,
     "extraction": 1289,
     "fem": 1440,
@@ -37,13 +38,13 @@ BUDGET = {
     "laws": 136,
     "modules": 747,
     "quality": 1143,
-    "readers": 6493,
-    "records": 2393,
+    "readers": 6488,
+    "records": 2392,
     "registry": 608,
-    "reports": 6246,
+    "reports": 6430,
     "rupture_assessment": 1825,
     "sampling": 960,
-    "screening": 545,
+    "screening": 572,
     "specimens": 3203,
     "studies": 2770,
     "surrogates": 1361,
@@ -51,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_000
+TESTS = 30_101
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -181,6 +181,7 @@ def _screen(
     as_json: bool,
 ) -> None:
     """Identify every alloy by itself, and write the plate."""
+    from creepkit.composition.mapping import map_where_known
     from creepkit.reports.screening import plate_to_json
 
     with ProgressBar() as progress:
@@ -192,7 +193,14 @@ def _screen(
     if plate.identified:
         plate.plot(to / "plate.png")
         written += [to / "fits", to / "plate.png"]
+    maps = map_where_known({one.alloy: one for one in plate.identified}, plate.compositions)
+    for mapped in maps.values():
+        mapped.plot(to / "compositions.png")
+        written.append(to / "compositions.png")
     show(plate, lambda one: plate_to_json(one, written), as_json=as_json, written=written)
+    if not as_json:
+        for mapped in maps.values():
+            tell(f"\n{mapped}")
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:

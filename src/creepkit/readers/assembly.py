@@ -1,4 +1,9 @@
-"""One test as text becomes one History; every file layout ends here."""
+"""One test as text becomes one History; every file layout ends here.
+
+A piece that is pressed gains area, where a bar under tension loses it. A file tells this by a word, or by negative
+stresses and strains. With e = 1 - h / h_0 of the height the logarithmic strain is -ln(1 - e), and the true stress the
+nominal one times 1 - e, which is what a law of a bar is given. The height is its gauge length, unless one is stated.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,6 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
-from creepkit.readers.compression import as_compressed, is_compression, take_height
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -59,10 +63,12 @@ from creepkit.records import (
     History,
     Loading,
     Program,
+    RecordedLoading,
     dimensions_of,
     known_specimens,
     specimen_of,
 )
+from creepkit.records.loading import held_of
 from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.specimens.elastic_part import with_elastic_part
 
@@ -95,7 +101,7 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
-    take_height(conditions, name)
+    _take_height(conditions, name)
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = up_to_rupture(conditions, from_loading_on(conditions, frames), name)
@@ -119,8 +125,8 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
-    if "strain" in outputs and loading.quantity == "stress" and is_compression(conditions, name):
-        loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
+    if "strain" in outputs and loading.quantity == "stress" and _is_compression(conditions, name):
+        loading, outputs["strain"] = _as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
     if "strain" in outputs:
@@ -142,7 +148,7 @@ def assemble_history(
     outputs = without_steps(conditions, frames.times, outputs, used, temperature)
     merged = {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
     rupture_time, unruptured = _end_of_test(conditions, frames, used, name, loading.quantity != "strain")
-    _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
+    _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, conditions.terms)
     history = History(
         times=frames.times,
         outputs=outputs,
@@ -296,7 +302,9 @@ def _time_and_end(
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
     label = next((name for name, end in (firm | remarks).items() if end in said), "")
     if len(said) > 1:
-        raise HistoryError(f"{conditions.location}: labels say {' and '.join(sorted(said))}; state '# ended: ruptured'")
+        each = {end: name for name, end in reversed((firm | remarks).items()) if end in said}
+        texts = [f"'{conditions.labels[n]}' in {conditions.location_of(n)} says {e}" for e, n in sorted(each.items())]
+        raise conditions.question(f"{' and '.join(texts)}; which holds?", "ended", *sorted(said), is_free=False)
     if (time is not None or asked) and unclear and not said:
         name = asked or next(iter(unclear))
         text = unclear[name]
@@ -446,15 +454,14 @@ def _specimen_and_outputs(
     return named or chosen[0], outputs
 
 
-def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], location: str) -> None:
+def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], known: Terms) -> None:
     """Refuse a column that would go unread, such as a pressure beside a stress."""
-    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", *read_columns}]
-    if unread:
-        read_text = ", ".join(sorted(read_columns))
-        table = frames.table
-        column = next(k for k, name in enumerate(table.columns) if name.startswith(unread[0]))
-        what = f"a column of {unread[0]} has no meaning beside {read_text}; is it to stay unread?"
-        raise column_question(table, what, {table.as_written(column): UNUSED})
+    read, table, errors = {"time", "used", *read_columns}, frames.table, list[HistoryError]()
+    for quantity in [name for name in frames.values if name.removesuffix("_sd") not in read]:
+        what = f"a column of {quantity} has no meaning beside {', '.join(sorted(read_columns))}; is it to stay unread?"
+        written = (table.as_written(k) for k, name in enumerate(table.columns) if known.quantity(name) == quantity)
+        errors.append(column_question(table, what, dict.fromkeys(written, UNUSED)))
+    raise_all(errors)
 
 
 def _elastic(
@@ -539,3 +546,43 @@ def _end_of_test(
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")
     return float(frames.times[used][-1] if used.any() else frames.times[-1]), False
+
+
+# ---- compression -----------------------------------------------------------------------------------------------------
+
+
+_COMPRESSION = re.compile(r"\bcompress(?:ion|ive|ed)\b|druckkriech|stauchversuch", re.IGNORECASE)
+"""Of a test that presses, in English, French and German; a compressor disc is none."""
+
+
+_TENSION = re.compile(r"tensi|traction|zug", re.IGNORECASE)
+"""Beside them of a machine for both."""
+
+
+def _is_compression(conditions: StatedConditions, name: str) -> bool:
+    """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
+    said = (name, conditions.text_of("name"), *conditions.labels, *conditions.labels.values(), *conditions.assumed)
+    return any(_COMPRESSION.search(text) and not _TENSION.search(text) for text in said)
+
+
+def _take_height(conditions: StatedConditions, name: str) -> None:
+    """Make the height of a piece that is compressed its gauge length, where none is stated."""
+    if {"height", "gauge_length"} & conditions.geometry.keys() == {"height"} and _is_compression(conditions, name):
+        height = conditions.geometry["gauge_length"] = conditions.geometry.pop("height")
+        conditions.record_assumption(f"the height {height:g} mm is the gauge length")
+
+
+def _as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:
+    """The loading with the true stress, and the logarithmic shortening (frames,) -, of a piece that is compressed.
+
+    times, strain : (frames,) s and -, of which shortening may be negative; measure : "engineering" or "logarithmic".
+    """
+    known = np.isfinite(strain)
+    shortening = -strain if strain[known].sum() < 0.0 else strain
+    if measure == "engineering":
+        shortening = -np.log1p(-np.minimum(shortening, 0.99))
+    if held_of(loading) == "stress" or not known.any():
+        return loading, shortening
+    at = np.concatenate([[0.0], times[known & (times > 0.0)]])
+    grown = np.interp(at, times[known], shortening[known])
+    return RecordedLoading(Program(at, loading.program().at(at) * np.exp(-grown)), "stress", "stress"), shortening

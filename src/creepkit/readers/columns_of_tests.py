@@ -45,10 +45,7 @@ QUANTITIES: Mapping[str, QuantityKind] = {
 """{quantity of a column: its kind}."""
 
 
-TEXTS = (
-    *("name", "alloy", "control", "specimen", "label heat", "label laboratory", "label elongation_pct"),
-    *("label reduction_of_area_pct",),
-)
+TEXTS = ("name", "alloy", "control", "specimen", *(key for key in NAMES_OF if key.startswith("label ")))
 """Keys of a history file that columns are."""
 
 
@@ -154,7 +151,7 @@ def column_called(written: str) -> TestColumn:
         if rate.kind is RATE:
             return replace(rate, factor=10.0 ** -abs(exponent))
     if (strain := _strain_reached(written)) is not None:
-        return TestColumn(f"{TIME_TO_STRAIN} {strain:.6g}", _unit_of_time(written))
+        return TestColumn(f"{TIME_TO_STRAIN} {strain:.6g}", unit_in(written, TIME))
     name, unit = split_written_name(written)
     if re.fullmatch(r"[\w ]+(?:/[\w ]+)+|.*=.*", unit) and not unit_suffix(unit):
         return TestColumn()  # (yes/no), (1 = failed): no unit but the values of the column
@@ -169,16 +166,14 @@ def column_called(written: str) -> TestColumn:
         return TestColumn(text)
     if quantity == LABEL:
         return TestColumn(f"label {written}")
-    return TestColumn(quantity, unit or (_unit_of_time(written) if QUANTITIES[quantity] is TIME else ""))
+    return TestColumn(quantity, unit or (unit_in(written, TIME) if QUANTITIES[quantity] is TIME else ""))
 
 
 def _meaning(name: str, is_per_cent: bool) -> str:
     if name.casefold() in ("a", "el") and not is_per_cent:
         return ""
-    if names_tests(name):
-        return "name"
-    plain = plain_words(name).replace("|", " ").replace("?", " ")
-    return NAMES.meaning(name) or NAMES.meaning(plain) or ""
+    plain = re.sub(r"[|?]", " ", plain_words(name))
+    return "name" if names_tests(name) else NAMES.meaning(name) or NAMES.meaning(plain) or ""
 
 
 def _quantity_by_words(name: str, unit: str) -> str:
@@ -219,21 +214,17 @@ def _strain_reached(written: str) -> float | None:
     return number / 100 if 0 < number <= 100 else None
 
 
-def unit_of_times(titles: Sequence[str]) -> str:
-    """The unit in which titles say that times are, as in `temps en heures`; "" where none does, or two differ."""
-    text = " | ".join(map(words_of, titles))
-    found = [unit for unit, names in _UNIT_IN_NAME.items() if re.search(rf"\b(?:in|en) (?:{names})\b", text)]
-    return found[0] if len(found) == 1 and _IS_TIME.search(plain_words(text)) else ""
+def unit_in(text: str, kind: QuantityKind, before: str = "") -> str:
+    """The unit of a kind in brackets, at the end, behind a comma, or of a time among the words, `hours to 1 % strain`.
 
-
-def _unit_of_time(written: str) -> str:
-    """The unit of a time in brackets, at the end, or among the words, as in `hours to 1 % strain`; "" for none."""
-    for text in (*re.findall(r"[(\[]([^()\[\]]*)[)\]]", written), split_written_name(written)[1]):
-        suffix = unit_suffix(text)
-        if suffix is not None and suffix in TIME.units:
-            return suffix
-    words = words_of(written)
-    return next((unit for unit, names in _UNIT_IN_NAME.items() if re.search(rf"\b(?:{names})\b", words)), "")
+    "" for none. before : pattern of what must stand before such a word.
+    """
+    places = [*re.findall(r"[(\[]([^()\[\]]*)[)\]]", text), split_written_name(text)[1]]
+    places += re.findall(r"(?:\bin|,|_)\s*([^\s,_]+)", text)
+    found = [unit_suffix(one) for one in places if unit_suffix(one) in kind.units and not before]
+    words = _UNIT_IN_NAME.items() if kind is TIME else ()
+    found += [unit for unit, names in words if re.search(rf"\b{before}(?:{names})\b", words_of(text))]
+    return next((one for one in found if one), "")
 
 
 def quantity_of(key: str) -> str:

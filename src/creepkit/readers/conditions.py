@@ -1,6 +1,8 @@
 """What is stated once for a test beside its frames: numbers, texts, lengths and labels.
 
-Nothing that a file states goes unread, and no key is guessed: an unknown one is an error, never a label.
+Nothing that a file states goes unread, and no key is guessed: an unknown one is an error, never a label. What remarks
+beside frames say of load and temperature, and no number does, is asked for: a change, `temp. raised to 620 C`, is a
+step; a pause, `70 h cold, unloaded`, in which the clock ran on and nothing crept, two of the load, to none and back.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from creepkit.errors import CreepkitError, HistoryError, quoted
 from creepkit.readers.ends_of_tests import (
     FIRM,
@@ -26,8 +30,10 @@ from creepkit.readers.ends_of_tests import (
     kind_of_column,
     marked_time,
 )
+from creepkit.readers.frames import TableFrames
 from creepkit.readers.questions import Answer, Question, collected, raise_all
 from creepkit.readers.table import SourceText
+from creepkit.readers.table_heads import LOAD_AGREEMENT, TEMPERATURE_AGREEMENT, conditions_in_text
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
     SPECIMEN_NAME_PATTERN,
@@ -37,9 +43,11 @@ from creepkit.readers.vocabulary import (
     plain_name,
     split_unit,
     unit_suffix,
+    value_in,
 )
 from creepkit.records import History, Program
-from creepkit.records.quantities import LENGTH, TIME, QuantityKind
+from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
+from creepkit.records.units import time_text
 
 _ALLOWED_COMBINATIONS = (
     "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for other "
@@ -390,3 +398,58 @@ def read_noise_correlation(conditions: StatedConditions) -> dict[tuple[str, str]
 def noise_correlation_text(correlations: Mapping[tuple[str, str], float]) -> str:
     """The text of the key, from which the same numbers are read."""
     return "; ".join(f"{first} {second} {float(value)!r}" for (first, second), value in correlations.items())
+
+
+# ---- what remarks say ------------------------------------------------------------------------------------------------
+
+
+_DURATION = re.compile(r"\d+(?:[.,]\d+)? ?[^\W\d_]+(?![\w/])")
+_OFF = re.compile(
+    r"\bcold\b|\bcooled|unload|without load|\bno load|(?:load|furnace|power|heating) (?:was |were )?(?:off|removed)"
+    r"|\bkalt\b|abgekühlt|entlastet|unbelastet|ohne last|ofen (?:war )?aus|\bfroid|décharg|(?:hors|sans) charge",
+    re.IGNORECASE,
+)
+"""Of a remark that a bar was cold or unloaded."""
+
+
+_CHANGE = re.compile(
+    r"rais|increas|chang|reduc|lower|decreas|\bset\b|\bstep|\bnow\b|erhöh|gesenkt|geändert|umgestellt|\bauf\b|augment"
+    r"|\bport[ée]|baiss|diminu|passé|→|->",
+    re.IGNORECASE,
+)
+_FROM = re.compile(r"(?:\b(?:from|von|de)\s+)?[\d.,]+\s*(?:°?[A-Za-z]{1,3})?\s+(?=(?:to|auf|à)\s+\d)")
+"""Of a remark on a change, and what it says of before."""
+
+
+def ask_of_remarks(conditions: StatedConditions, frames: TableFrames, quantity: str, value: float) -> None:
+    """Ask when a quantity, of which one value is stated, was another one as remarks say.
+
+    A reading beside such a remark was taken before a change. A pause lies in the gap before it, or in that behind it,
+    by which the clock ran on.
+    """
+    kind = TEMPERATURE if quantity == "temperature" else conditions.terms.load_kinds[quantity]
+    tolerance = TEMPERATURE_AGREEMENT if kind is TEMPERATURE else LOAD_AGREEMENT * value
+    times, steps, said = frames.times, [(0.0, 0.0, value)], dict[str, str]()
+    for label, text in conditions.labels.items():
+        line = int(label[5:]) if label.startswith("line ") and label[5:].isdecimal() else -1
+        k, found = int(np.searchsorted(frames.lines, line)), list[tuple[float, float, float]]()
+        if line <= frames.lines[0]:
+            continue
+        stated = conditions_in_text(_FROM.sub("", text), "", conditions.terms) if _CHANGE.search(text) else ()
+        for level in (value_in(one.text, kind) or value for one in stated if one.key == quantity):
+            is_beside = k < times.size and frames.lines[k] == line
+            early, late = times[[max(k - 1, 0), min(k, times.size - 1)]][:: -1 if is_beside else 1]
+            found += [(early, late, level)] * (abs(level - steps[-1][2]) > tolerance)
+        lasted = [one for one in (value_in(one, TIME) for one in _DURATION.findall(text)) if one]
+        if kind is not TEMPERATURE and _OFF.search(text) and len(lasted) == 1:
+            gaps = [n for n in (k, k + 1) if 0 < n < times.size and times[n] - times[n - 1] >= 0.999 * lasted[0]]
+            for start in [times[n] - lasted[0] if n == k else times[n - 1] for n in gaps[:1]]:
+                found += [(start, start, 0.0), (start + lasted[0], start + lasted[0], steps[-1][2])]
+        steps += found
+        said |= {text: frames.table.location(line)} if found else {}
+    if said:
+        (text, place), unit = next(iter(said.items())), next(iter(kind.units))
+        what = f"'{quoted(text, 60)}' says that the {quantity} changed, and {value:.6g} {unit} is stated; when was it?"
+        likely = ["; ".join(f"{time_text(one[k])} {one[2]:.6g} {unit}" for one in steps) for k in (0, 1)]
+        answers = dict.fromkeys([*likely, f"0 s {value:.6g} {unit}"])
+        raise conditions.question(what, f"{quantity}_steps", *answers, location=place)

@@ -46,7 +46,7 @@ from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import OUTLIERS, PAUSE, hold_begins, under_load, unloaded
 from creepkit.readers.table import SourceText
 from creepkit.readers.table_heads import LOAD_AGREEMENT
-from creepkit.readers.vocabulary import split_written_name, unit_suffix
+from creepkit.readers.vocabulary import split_written_name, value_in
 from creepkit.records.loading import Program
 from creepkit.records.quantities import LENGTH, STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings
@@ -185,15 +185,11 @@ def _with_strain(conditions: StatedConditions, frames: TableFrames, values: dict
 _LEVER = re.compile("lever|hebel|levier", re.IGNORECASE)
 _COMPLIANCE = re.compile("compliance|nachgiebigkeit|complaisance", re.IGNORECASE)
 _LENGTH_NAME = re.compile("length|länge|longueur", re.IGNORECASE)
-_LENGTH = re.compile(r"(\d+(?:[.,]\d+)?) ?([^\d\s]*)")
 
 
 def length_said(head: str, text: str) -> float | None:
     """mm, of a label that is a number with a unit of length in it or in its head; None of others."""
-    if not (match := _LENGTH.fullmatch(text.strip())):
-        return None
-    unit = unit_suffix(match[2] or split_written_name(head)[1]) or ""
-    return LENGTH.units[unit].factor * float(match[1].replace(",", ".")) if unit in LENGTH.units else None
+    return value_in(text, LENGTH, split_written_name(head)[1])
 
 
 def _with_stress(conditions: StatedConditions, frames: TableFrames, values: dict[str, Floats]) -> list[str]:
@@ -576,16 +572,11 @@ def without_steps(
 
 def _times_in(entry: SourceText) -> list[float]:
     """s; HistoryError for what is no times with units."""
-    times = list[float]()
-    for item in entry.text.split(";"):
-        number, _, unit = item.strip().partition(" ")
-        suffix = unit_suffix(unit)
-        if suffix is None or suffix not in TIME.units:
-            what = f"steps_taken_off is '{entry.text}'; write times such as 36.75 h; 120 h"
-            raise HistoryError(f"{entry.location}: {what}")
-        value = SourceText(number, entry.location).number("steps_taken_off")
-        times.append(TIME.convert(value, suffix, entry.location, "steps_taken_off"))
-    return sorted(times)
+    times = [value_in(item, TIME) for item in entry.text.split(";")]
+    if None in times:
+        what = f"steps_taken_off is '{entry.text}'; write times such as 36.75 h; 120 h"
+        raise HistoryError(f"{entry.location}: {what}")
+    return sorted(filter(None, times))
 
 
 def _line_at(time: float, times: Floats, values: Floats, frames: Ints) -> float:

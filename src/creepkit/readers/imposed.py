@@ -16,8 +16,15 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, quoted
-from creepkit.readers.conditions import StatedConditions, StatedNumber, TimeValuePairs, errors_located_at
+from creepkit.readers.conditions import (
+    StatedConditions,
+    StatedNumber,
+    TimeValuePairs,
+    ask_of_remarks,
+    errors_located_at,
+)
 from creepkit.readers.frames import TableFrames
+from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.vocabulary import COMPONENT_LOADING_KINDS, Terms
 from creepkit.records import Loading, PointLoading, Program, TwoLevels, loading_of
 from creepkit.records.quantities import TEMPERATURE, QuantityKind
@@ -144,6 +151,9 @@ def _stated_form(
 ) -> float | TimeValuePairs | Program | None:
     """What stands in the head: a number, steps or a program."""
     steps, breakpoints = (conditions.take_pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
+    is_answer = steps and ANSWERS_FILE in conditions.location_of(f"{quantity}_steps")
+    if steps and number and is_answer and np.isclose(number.value, steps[0][1], rtol=1e-4):
+        number = None  # of the first step
     forms = [form for form in (number, steps, breakpoints) if form is not None]
     if len(forms) > 1:
         what = f"{quantity} is given {len(forms)} times, as a number, {quantity}_steps or {quantity}_program; keep one"
@@ -210,6 +220,8 @@ def _stated_loading(
     if earlier is not None:
         conditions.stated[quantity] = Program(*np.array(earlier).T)
     noise = _noise_of_level(column) if isinstance(stated, tuple) and column is not None else 0.0
+    if column is None and isinstance(stated, float):
+        ask_of_remarks(conditions, frames, quantity, stated)
     if column is None or (stated is not None and _agrees(_as_program(stated), frames.times, column, noise)):
         return stated
     if stated is None:

@@ -34,13 +34,11 @@ from creepkit.readers.table import (
     SourceText,
     TableRow,
     dialect_of,
-    entry_of,
+    in_plain_numbers,
     is_comment,
     named_columns,
     refuse_long_cells,
     without_ignored,
-    without_logarithms,
-    without_thousands,
 )
 from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
@@ -182,33 +180,13 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
         return None
     if not rows:
         raise HistoryError(f"{table.place}: holds comments but no table; write a row of columns, then rows")
-    header, late = _entries(table, comments, rows[0].line)
-    header |= {
-        f"label cell {cell}": SourceText(text, f"{table.place}, comment of cell {cell}")
-        for cell, text in notes.comments.items()
-    }
+    table = table.with_comments(((row.line, row.cells) for row in comments), rows[0].line)
+    places = ((cell, f"{table.place}, comment of cell {cell}") for cell in notes.comments)
+    header = {f"label cell {cell}": SourceText(notes.comments[cell], place) for cell, place in places}
     decimal, merged = answers_of(path).decimal, _cells_below(rows, notes.merged)
     filled = _with_merged(_with_points(table, rows, texts, decimal), notes.merged)
-    table = replace(table, rows=filled, header=header, comments=late, merged=merged)
-    return without_logarithms(without_thousands(table, is_stated=bool(decimal)))
-
-
-def _entries(
-    table: CellTable, comments: Sequence[TableRow], first: int
-) -> tuple[dict[str, SourceText], list[tuple[int, str, SourceText]]]:
-    """The entries of comments above the first row, and those below it."""
-    header, late = dict[str, SourceText](), list[tuple[int, str, SourceText]]()
-    for row in comments:
-        (key, colon, text), location = entry_of(row.cells[0]), table.location(row.line)
-        beside = [cell for cell in row.cells[1:] if cell]
-        if key in header or len(beside) > (not text):
-            raise HistoryError(f"{location}: '{quoted(row.cells[0])}' is given twice or with several values; keep one")
-        entry = SourceText(text or "".join(beside), location)
-        if (colon or beside) and row.line < first:
-            header[key] = entry
-        elif colon or beside:
-            late.append((row.line, key, entry))
-    return header, late
+    table = replace(table, rows=filled, header={**table.header, **header}, merged=merged)
+    return in_plain_numbers(table, is_stated=bool(decimal))
 
 
 # ---- cells ---------------------------------------------------------------------------------------------------------

@@ -58,6 +58,8 @@ def in_standard_names(
 ) -> tuple[dict[str, SourceText], CellTable]:
     """Entries and columns of one test under creepkit's names, with units, and a strain whose unit is decided."""
     known = vocabulary.terms(specimen_named(entries, vocabulary))
+    told = {key for key, entry in entries.items() if _tells(known.condition(key), entry.text)}
+    entries = {f"label {key}" if key in told else key: entry for key, entry in entries.items()}
     stated = in_standard_keys(entries, known)
     by_titles = [one for key, title in entries.items() for one in _stated_by_title(key, title) if one[0] not in stated]
     table = table.assuming(*(f"{key} {entry.text} by the title in {entry.location}" for key, entry in by_titles))
@@ -104,6 +106,9 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
+        if name == "strain_measure":
+            said = [STATED_BY_NAME.get(f"{words_of(entry.text)}{rest}", ("", "")) for rest in ("", " strain")]
+            entry = replace(entry, text=next((text for key, text in said if key == name), entry.text))
         if name in stated and stated[name].says_the_same(entry):
             continue
         if name in stated:
@@ -125,9 +130,14 @@ def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:
 
 def _stated_by_title(key: str, title: SourceText) -> list[tuple[str, SourceText]]:
     """Conditions that a title states, as `Specimen 7C, TOTAL STRAIN` does; a creep strain rate is none."""
-    words = words_of(title.text) if key.startswith("label line ") else ""
+    words = words_of(title.text) if key.startswith("label line ") or _tells(key[6:].casefold(), title.text) else ""
     found = (re.search(rf"\b{name}\b(?! (?:rate|test|curve|range|vs)\b)", words) and one for name, one in _IN_TITLES)
     return [(one[0], replace(title, text=one[1])) for one in found if one]
+
+
+def _tells(quantity: str, text: str) -> bool:
+    """Whether a text says of a stress or strain what it is, and not how large."""
+    return quantity in ("stress", "strain") and not re.search(r"\d", text) and bool(text)
 
 
 _IN_TITLES = [one for one in STATED_BY_NAME.items() if " " in one[0] or "dehnung" in one[0]]
@@ -197,20 +207,15 @@ def _decided_by_table(name: str, table: CellTable) -> tuple[str, str]:
     is_large = largest > LARGEST_PER_CENT
     other = "microstrain" if is_large else "1"
     why = "are no fractions and hardly per cent" if is_large else "may be fractions or per cent"
-    raise Question(
-        table.path,
-        table.location(table.columns_line, table.column(name)),
-        f"'{name}' has no unit, and values up to {largest:g} {why}; name it {name}_{other} or {name}_pct, or write "
-        f"'# strain_unit: {other}' or '# strain_unit: %' above",
-        "strain_unit",
-        (other, "%") if is_large else ("%", other),
-    )
+    what = f"'{name}' has no unit, and values up to {largest:g} {why}; name it {name}_{other} or {name}_pct, or write"
+    choices = (other, "%") if is_large else ("%", other)
+    raise table.question(f"{what} '# strain_unit: {other}' or '# strain_unit: %' above", "strain_unit", *choices)
 
 
 # ---- times of a clock ------------------------------------------------------------------------------------------------
 
 
-_ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d{1,9})?)", re.ASCII)
+_ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d)(?::([0-5]\d(?:[.,]\d{1,9})?))?", re.ASCII)
 
 
 _ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:mm|h:m", re.IGNORECASE)
@@ -265,7 +270,7 @@ def _seconds_of(table: CellTable, clock: int, units: Sequence[float]) -> Floats:
         numbers = [float(part) for part in parts if is_number(part, Dialect())]
         if len(numbers) != len(units) or any(one >= limit for one, limit in zip(numbers, most, strict=True)):
             what = f"'{table.as_written(clock)}' is '{quoted(row.cells[clock])}'"
-            form = "h:mm:ss as above" if units == _H_MM_SS else "all cells as its name says"
+            form = "h:mm:ss as above" if units == _H_MM_SS[: len(units)] else "all cells as its name says"
             raise HistoryError(f"{table.location(row.line, clock)}: {what}; write {form}")
         seconds.append(sum(unit * number for unit, number in zip(units, numbers, strict=True)))
     return np.array(seconds)
@@ -273,24 +278,19 @@ def _seconds_of(table: CellTable, clock: int, units: Sequence[float]) -> Floats:
 
 def _times_of(table: CellTable, clock: int, synonyms: Mapping[str, str]) -> tuple[Floats, str]:
     """(rows,) s of times h:mm:ss, elapsed or of the day, and what was assumed of them."""
-    name, times = table.as_written(clock), _seconds_of(table, clock, _H_MM_SS)
+    name, count = table.as_written(clock), table.rows[0].cells[clock].count(":") + 1
+    times, form = _seconds_of(table, clock, _H_MM_SS[:count]), "h:mm:ss"[: 3 * count - 2]
     meant = synonyms.get(name, name)
     if words_of(meant) in OF_DAY:
         times = through_midnight(times)[0]
         return times - times[0], f"time since the first row at {table.rows[0].cells[clock]}"
     if _ELAPSED_NAME.search(meant):
-        return times, ""
-    if times[0] < 3600.0 or times.max() >= DAY:
+        return times, f"times such as {table.rows[-1].cells[clock]} in {form}" * (count == 2)
+    if count > 2 and (times[0] < 3600.0 or times.max() >= DAY):
         return times, f"times such as {table.rows[-1].cells[clock]} elapsed"
-    place = table.location(table.columns_line, clock)
-    raise Question(
-        table.path,
-        place,
-        f"'{name}' begins at {table.rows[0].cells[clock]}, which may be elapsed or of the day; name the column "
-        "'Elapsed time (h:mm:ss)' or 'Time of day'",
-        "columns",
-        [{name: words.replace(" ", "_")} for words in (OF_DAY[0], ELAPSED)],
-    )
+    what = f"'{name}' begins at {table.rows[0].cells[clock]}, which may be elapsed or of the day; name the column"
+    choices = ({name: words.replace(" ", "_")} for words in (OF_DAY[0], ELAPSED))
+    raise table.question(f"{what} 'Elapsed time ({form})' or 'Time of day'", "columns", *choices)
 
 
 def _since_first_row(cells: Sequence[str], table: CellTable, order: str, zone: str) -> tuple[Floats, str]:

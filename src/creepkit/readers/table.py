@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,7 +36,7 @@ from creepkit.files.delimited_text import (
     two_readings,
 )
 from creepkit.readers.ends_of_tests import kind_of_column
-from creepkit.readers.questions import Question
+from creepkit.readers.questions import Answer, Question
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
 MAXIMUM_CELL = 10_000
@@ -154,6 +155,10 @@ class CellTable:
             raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
         return self.columns.index(name)
 
+    def question(self, what: str, key: str, *choices: Answer, line: int = 0, is_free: bool = False) -> Question:
+        """The question of a line, else of the names of the columns, which the key of tests.toml answers."""
+        return Question(self.path, self.location(line or self.columns_line), what, key, choices, is_free=is_free)
+
     def as_written(self, column: int) -> str:
         """The name of a column as the file has it."""
         return (self.written or self.columns)[column]
@@ -194,6 +199,28 @@ class CellTable:
         rows = [TableRow(r.line, [text if k == column else c for k, c in enumerate(r.cells)]) for r, text in parts]
         return replace(self, rows=rows, columns=[name if k == column else c for k, c in enumerate(self.columns)])
 
+    def with_comments(self, comments: Iterable[tuple[int, Sequence[str]]], first: int) -> CellTable:
+        """The table with the entries of comments, line and cells, the value of a key perhaps in the second of these.
+
+        Those above the first row stand in the header; one without a colon or a value is a remark.
+        """
+        header, late = dict[str, SourceText](), list[tuple[int, str, SourceText]]()
+        for line, cells in comments:
+            (key, colon, text), place = entry_of(cells[0]), self.location(line)
+            beside = [cell for cell in cells[1:] if cell]
+            if len(beside) > (not text):
+                raise HistoryError(f"{place}: '{quoted(cells[0])}' is given with several values; keep one")
+            if key in header and line < first:
+                where = header[key].location.removeprefix(f"{self.place}, ").rpartition(":")[2]
+                what = f"'{key}' was already given in {'line ' * where.isdigit()}{where}"
+                raise HistoryError(f"{place}: {what}; keep one of them")
+            entry = SourceText(text or "".join(beside), place, self.dialect.decimal)
+            if (colon or beside) and line >= first:
+                late.append((line, key, entry))
+            elif (colon or beside) and plain_name(key) != "decimal":
+                header[key] = entry
+        return replace(self, header=header, comments=late)
+
     def assuming(self, *assumptions: str) -> CellTable:
         """The table with more that was assumed of it."""
         return replace(self, assumptions=(*self.assumptions, *assumptions))
@@ -230,7 +257,7 @@ _THOUSANDS, _WITH_SIGN = (
 """By a sign, numbers with it, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
 
 
-def without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
+def _without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
     """The table without the signs between thousands of its numbers, a comma where its decimal sign is a point.
 
     They are if the decimal sign is stated (is_stated), or if several numbers have a comma, each before three digits; a
@@ -244,12 +271,35 @@ def without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
         return table
     row, cell = found[0]
     if len(found) == 1 and cell.count(",") == 1 and not is_stated:
-        raise Question(table.path, table.location(row.line), two_readings(cell), "decimal", ("point",))
+        raise table.question(two_readings(cell), "decimal", "point", line=row.line)
     plain = {one: one.replace(sign, "") for _, one in found}
     rows = [TableRow(row.line, [plain.get(one, one) for one in row.cells]) for row in table.rows]
     return replace(table, rows=rows).assuming(
         f"{'commas' if sign == ',' else 'points'} stand between thousands ({plain[cell]})"
     )
+
+
+# ---- powers of ten -------------------------------------------------------------------------------------------------
+
+
+_POWER = re.compile(r"(?<=[\d.,])\s*[x×·*∙]\s*10\s*\^?\s*\(?([+\-−]?\d+|[⁻⁺⁰¹²³⁴-⁹]+)\)?")
+"""A power of ten, written as such."""
+
+
+def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
+    """The table without powers of ten, signs between thousands, and logarithms.
+
+    is_stated : whether the decimal sign is stated.
+    """
+    rows = list(table.rows)
+    for k, row in enumerate(rows):
+        if any("10" in cell and _POWER.search(cell) for cell in row.cells):
+            rows[k] = TableRow(row.line, [_POWER.sub(_exponent, cell) for cell in row.cells])
+    return _without_logarithms(_without_thousands(replace(table, rows=rows), is_stated=is_stated))
+
+
+def _exponent(power: re.Match[str]) -> str:
+    return f"e{unicodedata.normalize('NFKC', power[1]).replace('−', '-')}"
 
 
 # ---- comments ------------------------------------------------------------------------------------------------------
@@ -283,7 +333,7 @@ _MAY_BE_LOGARITHM = re.compile(
 _LARGEST_LOGARITHM = 20.0
 
 
-def without_logarithms(table: CellTable) -> CellTable:
+def _without_logarithms(table: CellTable) -> CellTable:
     """The table with numbers in the place of decimal logarithms, whose columns are called as `log t_r (h)` is."""
     rows, columns = table.rows, dict[int, str]()
     at = next((r for r, row in enumerate(rows[:60]) if any(map(_LOGARITHM.fullmatch, row.cells))), len(rows))

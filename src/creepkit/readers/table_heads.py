@@ -127,7 +127,7 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     table = replace(table, rows=[*table.rows[:end], *frames])
     numbered = [name for k, name in enumerate(table.rows[at].cells) if _numbers_readings(table, at, k, known)]
     table = table.assuming(*(f"'{quoted(name, 40)}' numbers the readings" for name in numbered))
-    table = without_ignored(_with_comments(table, line, known), at, (*vocabulary.ignored, *numbered))
+    table = without_ignored(with_entries_of_comments(table, line, known), at, (*vocabulary.ignored, *numbered))
     at = next((k for k, row in enumerate(table.rows[: at + 1]) if row.line == line), -1)
     if at < 0:
         raise HistoryError(f"{table.location(line)}: every column is left out by ignore; keep those of the test")
@@ -180,7 +180,7 @@ def _with_stated(table: CellTable, stated: Mapping[str, tuple[str, str]]) -> Cel
     return replace(table, header={**header, **{key: SourceText(*one) for key, one in stated.items()}})
 
 
-def _with_comments(table: CellTable, names_line: int, known: Terms) -> CellTable:
+def with_entries_of_comments(table: CellTable, names_line: int, known: Terms) -> CellTable:
     """The table with the entries of comments between its first row and its names.
 
     A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
@@ -261,6 +261,11 @@ class HeadOfTest:
         place, cells, known = self.table.location(row.line), [cell for cell in row.cells if cell], self.known
         if self.table.dialect.delimiter == " ":
             cells = [" ".join(cells)]
+        is_text = not any(
+            is_number(cell, self.table.dialect) or known.is_condition(cell.rstrip(": ")) for cell in cells
+        )
+        if self.table.dialect.delimiter == "," and is_text and any(conditions_in_text(c, "", known) for c in cells):
+            cells = [", ".join(cells)]  # a title with commas
         while len(cells) > 1 and cells[0] == cells[1] and not known.is_condition(cells[0].rstrip(": ")):
             cells = cells[1:]  # a title in merged cells
         key, colon, value = (part.strip() for part in "".join(cells[:1]).partition(":"))
@@ -410,9 +415,10 @@ _OF_THE_MATERIAL = re.compile(
 """Words of a text whose temperatures and stresses are those of a treatment or a property."""
 
 
-_LOWEST = 100.0
+_LOWEST, _ROOM = 100.0, 15.0
 _AT_TEST = re.compile(r"(?:creep|kriech|fluage|test|versuch|essai)\w*\b.*(?:\bat|\bbei|à|@)\s*$", re.IGNORECASE)
-"""Number of a temperature below which a text hardly means that of a creep test, unless it says so, or calls it one."""
+"""Numbers of a temperature below which a text hardly means that of a creep test, unless it says so or calls it one; and
+below which the name of a file or sheet does not, as of a solder, `SAC_25C`."""
 
 
 TEMPERATURE_AGREEMENT, LOAD_AGREEMENT = 3.0, 0.03
@@ -438,10 +444,11 @@ def _quantity_of(unit: str, known: Terms) -> str:
     return next(names, "")
 
 
-def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
+def conditions_in_text(text: str, place: str, known: Terms, *, is_name: bool = False) -> list[SourceText]:
     """Temperature and load that a text states, once each, and lengths such as `L0 = 40 mm`, each with its key.
 
-    [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`.
+    [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`. is_name : whether
+    it is the name of a file or sheet.
     """
     found: dict[str, list[str]] = {}
     if _OF_THE_MATERIAL.search(text):
@@ -465,6 +472,7 @@ def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
         is_range = _RANGE.search(rest[: match.start()]) is not None
         number = float(match[1].replace(",", "."))
         is_at = is_all or _AT_TEST.search(rest[: match.start()]) is not None
+        is_at |= is_name and number >= _ROOM and "temperature" not in found
         if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST and not is_at):
             continue
         if quantity:
@@ -475,8 +483,8 @@ def conditions_in_text(text: str, place: str, known: Terms) -> list[SourceText]:
 def sources_of_names(grid: CellTable, vocabulary: HeaderVocabulary) -> list[SourceText]:
     """What the names of sheet and file state of a test."""
     known, path = vocabulary.terms(), grid.path
-    sheet = conditions_in_text(grid.sheet, f"{path}, name of sheet '{grid.sheet}'", known) if grid.sheet else []
-    return [*sheet, *conditions_in_text(path.stem, f"{path}, name of the file", known)]
+    named = ((grid.sheet, f"name of sheet '{grid.sheet}'"), (path.stem, "name of the file"))
+    return [one for text, what in named for one in conditions_in_text(text, f"{path}, {what}", known, is_name=True)]
 
 
 def with_weak_sources(

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
@@ -92,35 +92,35 @@ def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Coll
     return table.keeping([k for k in range(len(table.columns)) if k not in columns])
 
 
-def with_days(table: CellTable, known: Terms) -> CellTable:
-    """The table with dates before the times of day beside them: without them readings of every day lie in one."""
-    names = [words_of(name) for name in table.columns]
-    days = [k for k, name in enumerate(names) if name in ("date", "datum", "day", "jour")]
-    clocks = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time" or names[k] == "heure"]
-    if len(days) != 1 or len(clocks) != 1 or days == clocks:
-        return table
-    (day,), (clock,) = days, clocks
-    joined = [f"{row.cells[day].removesuffix(' 00:00:00')} {row.cells[clock]}" for row in table.rows]
-    if not all(is_clock_time(text) and not is_number(text.partition(" ")[0], Dialect()) for text in joined):
-        return table
-    table = table.assuming(f"'{table.columns[day]}' and '{table.columns[clock]}' are one time")
-    return table.with_cells(clock, "timestamp", joined).keeping([k for k in range(len(names)) if k != day])
+_CLOCK = re.compile(r"^(\d{1,2})(?:[:h]|\.(?=.*uhr))(\d{2})(?: ?(?:uhr|h))?$", re.IGNORECASE)
+"""A time of day, `9h25`, `9.25 Uhr`."""
 
 
-def without_clocks(table: CellTable, known: Terms) -> CellTable:
-    """The table without dates and times of a clock, where a column of elapsed times in a unit is beside them."""
-    if not table.rows:
-        return table
+def with_one_clock(table: CellTable, known: Terms) -> CellTable:
+    """The table with dates before the times of day beside them, or without both beside elapsed times in a unit.
+
+    Without them readings of every day would lie in one.
+    """
     first = table.rows[0].cells
     times = [k for k, name in enumerate(table.columns) if known.quantity(name) == "time"]
+    days = [k for k, name in enumerate(table.columns) if words_of(name) in NAMES_OF["date"]]
     elapsed = [k for k in times if is_number(first[k], table.dialect)]
-    dates = [k for k, name in enumerate(table.columns) if words_of(name) in NAMES_OF["date"]]
-    clocks = [k for k in {*times, *dates} if is_clock_time(first[k])]
-    if not elapsed or not clocks:
+    clocks = sorted(k for k in {*times, *days} if is_clock_time(first[k]))
+    if elapsed and clocks:
+        names = " ".join(f"'{table.columns[k]}'" for k in clocks)
+        table = table.assuming(f"{names} not used beside '{table.columns[elapsed[0]]}'")
+        return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
+    if len(days) != 1 or len(times) != 1 or days == times:
         return table
-    names = " ".join(f"'{table.columns[k]}'" for k in sorted(clocks))
-    table = table.assuming(f"{names} not used beside '{table.columns[elapsed[0]]}'")
-    return table.keeping([k for k in range(len(table.columns)) if k not in clocks])
+    (day,), (clock,) = days, times
+    dates = [*accumulate((row.cells[day].removesuffix(" 00:00:00") for row in table.rows), lambda a, b: b or a)]
+    joined = [
+        " ".join([date, _CLOCK.sub(r"\1:\2", row.cells[clock])]) for date, row in zip(dates, table.rows, strict=True)
+    ]
+    if not all(map(is_clock_time, joined)) or any(is_number(date, Dialect()) for date in dates):
+        return table
+    table = table.assuming(f"'{table.columns[day]}' and '{table.columns[clock]}' are one time")
+    return table.with_cells(clock, "timestamp", joined).keeping([k for k in range(len(table.columns)) if k != day])
 
 
 _PART = re.compile(r"part(?:ie)?|teil|segment|run|lauf|section|abschnitt|phase", re.IGNORECASE)
@@ -443,7 +443,7 @@ def _tests_of_blocks(
     table, known, place = headed.table, headed.known, headed.place
     header = {key: entry for key, entry in table.header.items() if key != "columns"}
     used, rows, notes = {k for test in tests for k in test.columns}, table.rows[1:], dict[str, SourceText]()
-    rows = list(_rows_beside_notes(table, rows, used, notes))
+    rows = list(rows_beside_notes(table, rows, used, notes))
     results: dict[str, TabulatedTest] = {}
     heads = heads_of_tests(headed, [test.columns for test in tests], key_columns)
     for number, (test, head) in enumerate(zip(tests, heads, strict=True), 1):
@@ -478,7 +478,7 @@ def _tests_of_blocks(
     return list(results.values())
 
 
-def _rows_beside_notes(
+def rows_beside_notes(
     table: CellTable, rows: Sequence[TableRow], used: Collection[int], notes: dict[str, SourceText]
 ) -> Iterator[TableRow]:
     """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
@@ -510,15 +510,17 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
     for row in headed.whole:
         head.read(row)
     refuse_twice(head.entries, headed.table.header, headed.known)
-    table, footers = _without_remarks_around(headed.table, head.entries)
-    table = without_clocks(with_days(named_columns(table), headed.known), headed.known)
+    table, footers = _without_remarks_around(headed.table, head.entries, headed.known)
+    table = with_one_clock(named_columns(table), headed.known)
     table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
     table = without_remarks(table, head.entries, headed.known.vocabulary.labels)
     table = with_groups(with_names(table, headed.known), headed.known)
     return rows_by_test(table, {**table.header, **head.entries}, headed.known)
 
 
-def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> tuple[CellTable, list[str]]:
+def _without_remarks_around(
+    table: CellTable, notes: dict[str, SourceText], known: Terms
+) -> tuple[CellTable, list[str]]:
     """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
     footers, frames = list[str](), list[TableRow]()
     begins_with_text = [row.cells[0][:1].isalpha() and row.cells[0].lower() not in _LOST for row in table.rows]
@@ -532,8 +534,9 @@ def _without_remarks_around(table: CellTable, notes: dict[str, SourceText]) -> t
             frames.append(row)
             continue
         text = " ".join(filter(None, row.cells))
-        if end_said_by(text):
-            notes[f"label remark line {row.line}"] = SourceText(text, table.location(row.line))
+        states = bool(conditions_in_text(text, "", known))
+        if states or end_said_by(text):
+            notes[f"label {'remark ' * (not states)}line {row.line}"] = SourceText(text, table.location(row.line))
         footers.append(f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
     rows, width = list[TableRow](), max((k for k, cell in enumerate(table.rows[0].cells, 1) if cell), default=0)
     for row in frames:

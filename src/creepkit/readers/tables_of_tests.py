@@ -7,7 +7,6 @@ in merged cells, above blank ones, or in a row of its own.
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -20,6 +19,7 @@ from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
     RATES,
+    TEXTS,
     TestColumn,
     TestTableHead,
     column_called,
@@ -27,20 +27,20 @@ from creepkit.readers.columns_of_tests import (
     is_number_like,
     only_text,
     quantity_of,
-    unit_of_times,
+    unit_in,
 )
 from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
-from creepkit.readers.questions import Answer, Question, collected
+from creepkit.readers.questions import Question, collected
 from creepkit.readers.table import (
     POINT_OF_THOUSANDS,
     CellTable,
     SourceText,
     TableRow,
-    cells_of_width,
     with_commas_of_remarks,
     without_ignored,
 )
-from creepkit.readers.table_heads import conditions_in_text, sources_of_names
+from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, sources_of_names, with_entries_of_comments
+from creepkit.readers.table_layouts import rows_beside_notes
 from creepkit.readers.tests_file import answers_of
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
@@ -77,10 +77,6 @@ _GROUPED = re.compile(r"\d{1,3}(?:\.\d{3})+,\d+|\d{1,3}(?:,\d{3})+\.\d+|\d{1,3}(
 """A number with separators between thousands that cannot be a decimal sign."""
 
 
-_POWER = re.compile(r"(?<=[\d.,])\s*(?:[x×·*∙]\s*)10\s*\^?\s*\(?([+-]?\d+|[⁻⁺⁰¹²³⁴-⁹]+)\)?")
-"""A power of ten, written as such."""
-
-
 def plain_number(text: str, decimal: str) -> tuple[str, str]:
     """A text with a number without separators between thousands, and the decimal sign of that: a point if it may be."""
 
@@ -89,7 +85,6 @@ def plain_number(text: str, decimal: str) -> tuple[str, str]:
         whole, _, part = found[0].rpartition(sign) if found[0].count(sign) == 1 else (found[0], "", "")
         return re.sub(r"[.,\s'’]", "", whole) + (f".{part}" if part else "")
 
-    text = _POWER.sub(lambda found: f"e{unicodedata.normalize('NFKC', found[1]).replace('−', '-')}", text)
     changed, count = _GROUPED.subn(plain, text)
     if not count and decimal == "," and re.fullmatch(r"\D*\d*,\d+(?:[eEdD][+-]?\d+)?\D*", text):
         changed, count = text.replace(",", "."), 1
@@ -160,13 +155,6 @@ class TestTable:
             text, decimal = f"{self.columns[k].factor * float_of(text):.12g}", "."
         return SourceText(text, self.table.location(row.line), decimal, self.names[k])
 
-    def question(
-        self, what: str, key: str, choices: Sequence[Answer], *, line: int = 0, is_free: bool = False
-    ) -> Question:
-        """The question of a row, else of the names of the columns."""
-        place = self.table.location(line) if line else self.place
-        return Question(self.table.path, place, what, key, choices, is_free=is_free)
-
     # ---- what stands where
 
     def _read(self, sheet: CellTable, head: TestTableHead) -> None:
@@ -177,7 +165,8 @@ class TestTable:
         body = with_commas_of_remarks(sheet, body, head.names)
         below = replace(sheet, rows=[TableRow(line, list(head.names)), *body])
         below = without_ignored(below, 0, self.vocabulary.ignored)
-        header = self._around(replace(sheet, header=below.header), sheet.rows[: head.first], known)
+        sheet = with_entries_of_comments(replace(sheet, header=below.header), line, known)
+        around = self._around(sheet, sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
         if statistics := [row for row in body if _is_statistic(row, dialect)]:
             body = [row for row in body if row not in statistics]
@@ -188,58 +177,34 @@ class TestTable:
         while body and _is_note(body[-1], dialect):
             self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
         named = [k for k, name in enumerate(names) if name]
-        width, stated, notes = named[-1] + 1, dict[str, SourceText](), list[str]()
+        stated, beside = dict[str, SourceText](), dict[str, SourceText]()
         for row in body:
             if text := only_text(row, dialect):
                 place = sheet.location(row.line)
                 found = {one.key: SourceText(one.text, place) for one in conditions_in_text(text, place, known)}
                 stated = found or {"label group": SourceText(text, place)}
                 continue
-            cells = cells_of_width(sheet, row, width, beside=True)
-            if any(cells[k] for k in named):
-                for cell in filter(None, cells[width:]):
-                    if is_number_like(cell, dialect):
-                        what = f"'{quoted(cell)}' stands in a column without a name; name that column"
-                        raise HistoryError(f"{sheet.location(row.line)}: {what}")
-                notes.append(" ".join(cell for k, cell in enumerate(cells) if cell and k not in named))
-                self.rows.append(TestRow(row.line, [cells[k] for k in named], stated))
-        if any(notes):
-            for test, note in zip(self.rows, notes, strict=True):
-                test.cells.append(note)
-        columns = [*(names[k] for k in named), *(["note"] if any(notes) else [])]
-        positions = [below.positions[k] if below.positions else k for k in named] + [width] * any(notes)
-        titles = [(row.line, only_text(row, dialect)) for row in sheet.rows[: head.first]]
-        sources = [one for n, text in titles for one in conditions_in_text(text, sheet.location(n), known)]
-        sources += sources_of_names(sheet, self.vocabulary)
-        self.table = replace(
-            sheet,
-            rows=(),
-            columns=columns,
-            columns_line=line,
-            header=header,
-            positions=positions,
-            sources=tuple(sources),
-        )
+            (row,) = rows_beside_notes(sheet, [row], named, beside)
+            if any(row.cells[k] for k in named):
+                self.rows.append(TestRow(row.line, [row.cells[k] for k in named], stated))
+        for test in self.rows if beside else ():
+            test.cells.append(beside.get(f"label beside line {test.line}", SourceText("", "")).text)
+        columns = [*(names[k] for k in named), *["note"] * bool(beside)]
+        positions = [below.positions[k] if below.positions else k for k in named] + [named[-1] + 1] * bool(beside)
+        sources = [*around.sources, *sources_of_names(sheet, self.vocabulary)]
+        self.table = replace(sheet, rows=(), columns=columns, columns_line=line, header=around.entries)
+        self.table = replace(self.table, positions=positions, sources=tuple(sources))
 
-    def _around(self, sheet: CellTable, above: Sequence[TableRow], known: Terms) -> dict[str, SourceText]:
+    def _around(self, sheet: CellTable, above: Sequence[TableRow], known: Terms) -> HeadOfTest:
         """What lines above a table state of all its tests; all else is a note."""
-        header = dict(sheet.header)
+        head = HeadOfTest(sheet, known, dict(sheet.header))
         for row in above:
-            filled = list(dict.fromkeys(cell for cell in row.cells if cell))
-            if len(filled) == 1 and ":" in filled[0]:
-                filled = [part.strip() for part in filled[0].split(":", 1)]
-            key = filled[0].rstrip(": =")
-            if len(filled) in (2, 3) and known.is_condition(key):
-                unit = f" ({filled[2]})" if len(filled) == 3 and not split_written_name(key)[1] else ""
-                header[f"{key}{unit}"] = SourceText(filled[1], sheet.location(row.line), sheet.dialect.decimal)
-            else:
-                self.notes.append(" ".join(filled))
-        for line, key, entry in sheet.comments:
-            if known.is_condition(key):
-                what = f"'{key}' stands below the names of the columns"
-                raise HistoryError(f"{sheet.location(line)}: {what}; move it above them")
-            self.notes.append(f"{key}: {entry.text}")
-        return header
+            head.read(row)
+        for key in [key for key in head.entries if key.startswith("label ") and key not in {*sheet.header, *TEXTS}]:
+            entry = head.entries.pop(key)
+            self.notes.append(entry.text if key.startswith("label line ") else f"{key[6:]} {entry.text}")
+        self.notes += [f"{key}: {entry.text}" for _, key, entry in sheet.comments]
+        return head
 
     # ---- columns
 
@@ -257,7 +222,7 @@ class TestTable:
                 collected(self.errors, partial(self._ask_of_points, written, cells))
             if kind := column.kind:
                 column = replace(column, unit=column.unit or _unit_of_cells(cells))
-                if kind is TIME and not column.unit and (unit := unit_of_times(self.notes)):
+                if kind is TIME and not column.unit and (unit := unit_in(" | ".join(self.notes), TIME, "(?:in|en) ")):
                     self.table = self.table.assuming(f"'{quoted(written, 60)}' in {unit} by the title")
                     column = replace(column, unit=unit)
                 if column.unit not in kind.units:
@@ -307,13 +272,13 @@ class TestTable:
         are_doubtful = len(points) > 1 and all(map(POINT_OF_THOUSANDS.fullmatch, points))
         if are_doubtful and len(points) < sum(map(bool, cells)) and not answers_of(self.table.path).decimal:
             readings = f"'{points[0]}' in '{quoted(written, 60)}' may be {points[0]} or {points[0].replace('.', '')}"
-            raise self.question(readings, "decimal", ("comma", "point"))
+            raise self.table.question(readings, "decimal", "comma", "point")
 
     def _twice(self, written: str, other: str) -> HistoryError:
         what = f"'{quoted(other, 60)}' and '{quoted(written, 60)}' mean the same; keep one of them"
         if written == other:
             return HistoryError(f"{self.place}: {what}, or put tables side by side below one another")
-        return self.question(what, "columns", ({written: LABEL}, {other: LABEL}))
+        return self.table.question(what, "columns", {written: LABEL}, {other: LABEL})
 
     def _wrong_unit(self, column: TestColumn, written: str, cells: Sequence[str]) -> HistoryError:
         assert column.kind is not None
@@ -328,7 +293,7 @@ class TestTable:
             numbers = [float(number) for cell in cells for number in re.findall(r"^\d+", cell)]
             likely = ["C", "K", "F"] if min(numbers, default=0) < 900 else ["K", "C", "F"]
         name = column.quantity.replace(" ", "_")
-        return self.question(what, "columns", [{written: f"{name}_{unit}"} for unit in likely], is_free=True)
+        return self.table.question(what, "columns", *({written: f"{name}_{unit}"} for unit in likely), is_free=True)
 
     def _refuse_misspelt(self, written: str) -> None:
         name, unit = split_written_name(written)
@@ -340,7 +305,7 @@ class TestTable:
         if near and kind_of_column(written) == "" and not is_another:
             meant = f"{near[0]} ({unit_suffix(unit)})" if unit_suffix(unit) else near[0]
             what = f"column '{quoted(written, 60)}' is not understood; did you mean '{near[0]}'?"
-            raise self.question(what, "columns", ({written: meant}, {written: LABEL}))
+            raise self.table.question(what, "columns", {written: meant}, {written: LABEL})
 
     def _ask_of_quantity(self, written: str) -> None:
         """Ask of a time or a rate that is not understood: `t0.2 (h)` may be one to a strain."""
@@ -356,7 +321,7 @@ class TestTable:
             meaning, what = f"stress ({unit})", f"column '{quoted(written, 60)}' is not understood; is it the stress?"
         else:
             return
-        raise self.question(what, "columns", [{written: meaning}, {written: LABEL}], is_free=True)
+        raise self.table.question(what, "columns", {written: meaning}, {written: LABEL}, is_free=True)
 
     def _has(self, quantity: str) -> bool:
         """Whether some column is called as one of a quantity."""
@@ -419,7 +384,8 @@ class TestTable:
         plain = likely.replace(",", ".")
         number = float(plain) if is_number(plain, Dialect()) else likely
         what = f"the cell of '{quoted(name, 60)}' is empty{others}; which {quantity} is it?"
-        return self.question(what, f"{quantity}_{unit}", (number,), line=self.rows[missing[0]].line, is_free=True)
+        line = self.rows[missing[0]].line
+        return self.table.question(what, f"{quantity}_{unit}", number, line=line, is_free=True)
 
     def _leave_out_silent_rows(self) -> None:
         """Leave out rows that state no result once columns are left out, which its assumptions name."""

@@ -7,12 +7,23 @@
 How a test ended is read of marks of its time (`>10000`, `10000+`), of columns of words, codes or yes and no, and of
 remarks; what stays open is asked for (`ends_of_tests`). Times to a strain become frames of strain. Other columns are
 labels. All errors of a file come at once.
+
+Rupture times may stand in a matrix, temperatures by stresses:
+
+    Time to rupture (h), heat AAA
+    Temperature (°C) / Stress (MPa), 235, 196, 177
+    550, 20.3, 132.3, (60000)
+    600, -, 11.9, 32.4
+
+A head above it says that its times are those of rupture. A cell in brackets, unless a note says otherwise, or behind
+`>` is a run-out; one that is empty or a dash was not tested.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -22,12 +33,15 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
+    RATES,
     TestColumn,
     column_called,
     head_of_tests,
+    is_number_like,
     only_text,
     quantity_of,
     stands_in_columns,
+    unit_in,
 )
 from creepkit.readers.ends_of_tests import (
     FIRM,
@@ -46,7 +60,6 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import TABLE_SUFFIXES, TEXT_SUFFIXES
-from creepkit.readers.matrix_of_tests import one_row_a_test
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
@@ -54,9 +67,9 @@ from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.tables_of_tests import MOST_ASKED, TestRow, TestTable
 from creepkit.readers.text_files import peek_table, read_text_table
-from creepkit.readers.vocabulary import HeaderVocabulary, split_written_name, words_of
+from creepkit.readers.vocabulary import HeaderVocabulary, split_written_name, unit_suffix, words_of
 from creepkit.records import History
-from creepkit.records.quantities import TIME
+from creepkit.records.quantities import STRESS, TEMPERATURE, TIME, QuantityKind
 
 _ROUNDING = 0.01
 """Part of a time by which two that are the same may differ."""
@@ -314,7 +327,10 @@ def ends_of_rows(table: TestTable) -> list[RowEnd]:
             group = row.stated.get("label group")
             said = set(stated.values()) | ({end_said_by(group.text) if group else ""} & {STOPPED, RUPTURED})
         if len(said) > 1:
-            each = " and ".join(f"'{quoted(table.names[k])}' says {end}" for k, end in (firm or stated).items())
+            named_cells = (
+                (quoted(table.names[k]), quoted(row.cells[k], 40), end) for k, end in (firm or stated).items()
+            )
+            each = " and ".join(f"'{name}' is '{cell}' and says {end}" for name, cell, end in named_cells)
             table.errors.append(HistoryError(f"{table.table.location(row.line)}: {each}; correct one of them"))
         is_unsaid = any(kinds[k] == "status" and one.ends[r] == "" for k, one in found.items())
         notes = list[str]()
@@ -341,10 +357,9 @@ def _asked_of_notes(table: TestTable, answers: Mapping[str, str]) -> list[Histor
     if any(name.casefold() in answers for name in names if name):
         return []
     return [
-        table.question(
+        table.table.question(
             f"the note '{quoted(note, 80)}' may speak of tests that did not break; which are they?",
-            "ended",
-            ({names[-1] or "NAME OF A TEST": STOPPED}, {note: LABEL}),
+            *("ended", {names[-1] or "NAME OF A TEST": STOPPED}, {note: LABEL}),
         )
         for note in table.notes
         if end_said_by(note) not in ("", RUPTURED) and not legend_in(note) and note.casefold() not in answers
@@ -363,12 +378,10 @@ def _asked_of_column(table: TestTable, k: int, column: EndsOfColumn, time: int |
         likely = _likely_unbroken(table, k, flags, time)
         other = next(text for text in flags if text != likely)
         choices = [{likely: STOPPED, other: RUPTURED}, {likely: RUPTURED, other: STOPPED}]
-    return table.question(
-        f"'{quoted(table.names[k], 60)}' says {listed}{more}: did these tests break, were they stopped before, or does "
-        "it say nothing of their end?",
-        "ended",
-        [*choices, dict.fromkeys(texts, LABEL)],
-        line=table.rows[first].line,
+    what = f"'{quoted(table.names[k], 60)}' says {listed}{more}: did these tests break, were they stopped before, or"
+    choices.append(dict.fromkeys(texts, LABEL))
+    return table.table.question(
+        f"{what} does it say nothing of their end?", "ended", *choices, line=table.rows[first].line
     )
 
 
@@ -393,8 +406,8 @@ def _asked_of_marks(table: TestTable, time: int, marked: Mapping[str, TestRow]) 
             place = table.table.location(row.line)
             errors.append(HistoryError(f"{place}: {what}; write a number of {table.names[time]}, >1000 for a run-out"))
             continue
-        choices = [{mark.casefold(): STOPPED}, {mark.casefold(): RUPTURED}]
-        errors.append(table.question(f"{what}: did this test break then?", "ended", choices, line=row.line))
+        choices = ({mark.casefold(): end} for end in (STOPPED, RUPTURED))
+        errors.append(table.table.question(f"{what}: did this test break then?", "ended", *choices, line=row.line))
     return errors
 
 
@@ -442,3 +455,86 @@ def _check_duration(rupture: Cell, duration: Cell | None) -> None:
             f"{one.location}: '{one.key}' is {quoted(one.text)}, and '{other.key}' is {quoted(other.text)}; a test "
             "that ruptured lasted until then; correct one of them"
         )
+
+
+# ---- a matrix of rupture times -------------------------------------------------------------------------------------
+
+
+_OF_RUPTURE = re.compile(r"rupture|zeitstand|bruchzeit|standzeit|time to failure", re.IGNORECASE)
+_HEAT = re.compile(
+    r"(?i:heat|cast|charge|schmelze|coulée|batch)(?: no\.?)?[ _:=#-]*((?=[A-Z\d])(?!Treat)[\w-]+?)(?:_|\b)"
+)
+_WITH_UNIT = re.compile(r"(\d+(?:[.,]\d+)?)?\s*(\S*)")
+_DEEPEST, _SEARCHED = 4, 60
+"""Rows of a head; and within which the matrix must begin."""
+
+
+def one_row_a_test(table: CellTable) -> CellTable:
+    """A matrix of rupture times as a table with one row a test; any other table as it is."""
+    rows, dialect = table.rows, table.dialect
+    for at, row in enumerate(rows[:_SEARCHED]):
+        above = [cell for one in rows[max(0, at - _DEEPEST) : at] for cell in one.cells if cell]
+        is_named = not is_number_like(row.cells[0], dialect)  # the row of stresses; a test begins with a temperature
+        if is_named and len(_axis(row.cells[1:], STRESS)[0]) > 1 and at + 1 < len(rows):
+            said = [*above, row.cells[0], table.sheet, table.path.stem]
+            first = [one.cells[0] for one in rows[max(0, at - _DEEPEST) : at + 1] if one.cells[0]]
+            if any(map(_OF_RUPTURE.search, said)) and not any(map(RATES.search, map(str.casefold, said))):
+                return _unfolded(table, at, said, first) or table
+    return table
+
+
+def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[str]) -> CellTable | None:
+    """The rows of tests of a matrix whose stresses stand in a row; None where the rows below are no temperatures.
+
+    said : texts of its head. first : those of its first column.
+    """
+    dialect = table.dialect
+    stresses, loads = _axis(table.rows[at].cells[1:], STRESS)
+    corners = [part for text in reversed(first) for part in re.split(r"\s+[\\/|]\s+|\\", text)]
+    columns = [column_called(part) for part in corners]
+    unit = next((one.unit for one in columns if one.quantity == "temperature"), None)
+    body = [row for row in table.rows[at + 1 :] if not only_text(row, dialect)]
+    temperatures, degrees = _axis([row.cells[0] for row in body], TEMPERATURE)
+    is_stress = loads or any(re.search(r"stress|spannung|contrainte|σ|MPa", text) for text in said)
+    is_whole = "" not in temperatures and len(temperatures) == len(body)
+    if not (is_stress and is_whole) or (unit is None and not degrees):
+        return None
+    of_rupture = [text for text in said if _OF_RUPTURE.search(text)]
+    times, loads = (
+        known or next(filter(None, (unit_in(text, kind) for text in texts)), "")
+        for known, texts, kind in (("", of_rupture, TIME), (loads, said, STRESS))
+    )
+    heat = next((found[1] for text in said if (found := _HEAT.search(text)) and found[1]), "")
+    names = [("Temperature", degrees or unit), ("Stress", loads), ("Rupture time", times)]
+    head = ["Test", *(f"{name} ({unit})" if unit else name for name, unit in names), *["Heat"] * bool(heat)]
+    notes = [row for row in table.rows if only_text(row, dialect) and row.line > table.rows[at].line]
+    texts = [only_text(row, dialect).replace("( )", "()") for row in notes]
+    legend = {sign: end for text in texts for sign, end in legend_in(text).items()}
+    tests, count = list[TableRow](), Counter[str]()
+    for row, temperature in zip(body, temperatures, strict=True):
+        for stress, cell in zip(stresses, row.cells[1:], strict=False):
+            if is_missing(cell) or cell in ("\N{MINUS SIGN}", "...", "…"):
+                continue
+            if not stress or not is_number_like(cell, dialect):
+                return None
+            if cell[0] in "([" and legend.get("()") != RUPTURED:
+                cell = f">{cell.strip('()[] ')}"
+            name = f"{heat or table.sheet or table.path.stem} {temperature} {stress}"
+            count[name] += 1
+            name = f"{name} ({count[name]})" if count[name] > 1 else name
+            tests.append(TableRow(row.line, [name, temperature, stress, cell, *[heat] * bool(heat)]))
+    titles = [row for row in table.rows[:at] if only_text(row, dialect) and row.cells[0]]
+    whole = [*titles, TableRow(table.rows[at].line, head), *tests, *notes]
+    return replace(table, rows=whole, merged=frozenset()).assuming("a test a cell of a matrix of rupture times")
+
+
+def _axis(cells: Iterable[str], kind: QuantityKind) -> tuple[list[str], str]:
+    """The numbers of conditions in cells, "" for none, and the unit that stands beside them; [] where some are none."""
+    found = [_WITH_UNIT.fullmatch(cell) for cell in cells]
+    units = {unit_suffix(one[2]) if one and one[2] else "" for one in found} - {""}
+    if None in found or not units <= {*kind.units} or len(units) > 1:
+        return [], ""
+    values = [one[1] or "" for one in found if one]
+    while values and not values[-1]:
+        values.pop()
+    return values, "".join(map(str, units))

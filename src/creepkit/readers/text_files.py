@@ -27,12 +27,11 @@ from creepkit.readers.table import (
     TableRow,
     dialect_of,
     entry_of,
+    in_plain_numbers,
     is_comment,
     named_columns,
     refuse_long_cells,
     without_ignored,
-    without_logarithms,
-    without_thousands,
 )
 from creepkit.readers.tests_file import DECIMAL_SIGNS, answers_of
 from creepkit.readers.vocabulary import plain_name, unit_suffix
@@ -81,7 +80,8 @@ def read_head_alone(path: Path) -> dict[str, SourceText]:
     lines = text_lines(decode_text(start, path)) if len(start) < _BEGINNING else [" a table"]
     if any(line.strip() and not is_comment(line) for line in lines):
         return {}
-    return _head_entries(path, lines, (), Dialect(decimal=_stated_decimal(path, lines) or "."))
+    table = CellTable(path, (), dialect=Dialect(decimal=_stated_decimal(path, lines) or "."))
+    return dict(table.with_comments(((k, [line]) for k, line in enumerate(lines, 1)), len(lines) + 1).header)
 
 
 def table_of_text(path: Path, text: str, decimal: str = "") -> CellTable:
@@ -100,19 +100,10 @@ def table_of_text(path: Path, text: str, decimal: str = "") -> CellTable:
     rows = list(_rows_of_texts(_numbered(text, offset, first, comments), dialect, path))
     if not rows:
         raise HistoryError(f"{path}:{first}: no cell holds anything; write a line of columns, then rows")
-    table = CellTable(
-        path,
-        rows,
-        dialect=dialect,
-        header=_head_entries(path, head, rows[0].cells, dialect),
-        comments=[
-            (line, key, SourceText(entry, f"{path}:{line}", dialect.decimal))
-            for line, comment in comments
-            for key, colon, entry in [entry_of(comment)]
-            if colon
-        ],
-    )
-    return without_logarithms(without_thousands(table, is_stated=bool(decimal)))
+    head = _without_padding(head, rows[0].cells, dialect)
+    every = [*enumerate(head, 1), *comments]
+    table = CellTable(path, rows, dialect=dialect).with_comments(((k, [line]) for k, line in every), first)
+    return in_plain_numbers(table, is_stated=bool(decimal))
 
 
 def _numbered(
@@ -232,20 +223,8 @@ def _stated_decimal(path: Path, head: Sequence[str]) -> str:
     return ""
 
 
-def _head_entries(path: Path, lines: Sequence[str], names: Sequence[str], dialect: Dialect) -> dict[str, SourceText]:
-    """The `# key: value` lines; a comment without a colon is a remark.
-
-    A spreadsheet writes them with an empty cell for each further column; these cells are cut off.
-    """
+def _without_padding(lines: Sequence[str], names: Sequence[str], dialect: Dialect) -> list[str]:
+    """The lines of a head without the empty cells that a spreadsheet writes for each further column."""
     padding = dialect.delimiter * (len(names) - 1)
     is_padded = len(names) > 1 and all(line.rstrip(" ").endswith(padding) for line in lines if line.strip())
-    header: dict[str, SourceText] = {}
-    for number, line in enumerate(lines, 1):
-        key, colon, text = entry_of(line.rstrip(" ").removesuffix(padding) if is_padded else line)
-        if not colon or plain_name(key) == "decimal":
-            continue
-        if key in header:
-            first = header[key].location.rpartition(":")[2]
-            raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
-        header[key] = SourceText(text, f"{path}:{number}", dialect.decimal)
-    return header
+    return [line.rstrip(" ").removesuffix(padding) for line in lines] if is_padded else list(lines)

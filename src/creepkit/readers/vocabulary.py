@@ -54,7 +54,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("datum und uhrzeit", "datum uhrzeit", "datum/uhrzeit", "datum zeit", "date et heure", "date heure"),
         *("beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
     ),
-    "date": ("date", "datum", "day", "jour", "heure"),
+    "date": ("date", "datum", "day", "tag", "jour"),
     "temperature": (
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
@@ -170,10 +170,14 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
 laboratories apart."""
 
 
-_TRUE = ("true strain", "logarithmic strain", "true creep strain", "hencky strain", "wahre dehnung", "eps true")
+_TRUE = (
+    *("true strain", "logarithmic strain", "true creep strain", "hencky strain", "wahre dehnung", "eps true"),
+    *("log strain", "déformation vraie", "déformation rationnelle", "logarithmische dehnung"),
+)
+_NOMINAL = ("engineering strain", "nominal strain", "technische dehnung", "déformation nominale")
 STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
     **dict.fromkeys(_TRUE, ("strain_measure", "logarithmic")),
-    "engineering strain": ("strain_measure", "engineering"),
+    **dict.fromkeys(_NOMINAL, ("strain_measure", "engineering")),
     **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
     **dict.fromkeys(("ε tot", "eps tot", "ε total", "dehnung gesamt"), ("includes_elastic", "yes")),
     **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
@@ -234,6 +238,16 @@ def unit_suffix(text: str) -> str | None:
     ):
         return f"{'pct' if UNIT_SPELLINGS.get(rate[1]) == 'pct' else '1'}/{time}"
     return UNIT_SPELLINGS.get(plain)
+
+
+_MEASURED = re.compile(r"\s*([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) ?([^\s\d].*?)?\s*")
+
+
+def value_in(text: str, kind: QuantityKind, unit: str = "") -> float | None:
+    """A number with its unit, `36.75 h`, in creepkit's; None for any other text. unit : where the text has none."""
+    match = _MEASURED.fullmatch(text)
+    conversion = kind.units.get(unit_suffix(match[2] or unit) or "?") if match else None
+    return conversion.factor * float(match[1].replace(",", ".")) + conversion.offset if match and conversion else None
 
 
 def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix) -> tuple[str, str]:
@@ -320,7 +334,9 @@ class NameTable:
         return f"{quantity}_{unit_suffix(unit) or unit}" if unit else quantity
 
 
-_NUMBERING = r"names?|ids?|no|nr|n|num(?:ber|mer|[ée]ro)?|nom|code|label|bezeichnung|kennung|r[ée]f[ée]rence|identif\w+"
+_NUMBERING = (
+    r"names?|ids?|no|nr|(?<!\w)n|num(?:ber|mer|[ée]ro)?|nom|code|label|bezeichnung|kennung|r[ée]f[ée]rence|identif\w+"
+)
 _OF_TESTS = re.compile(
     rf"(?:(?:{_NUMBERING}) )*(?:tests?|test piece|samples?|specimens?|proben?|pr[uü]fling|versuchs?|essai|[ée]prouvette"
     rf"|[ée]chantillon|rep[èe]re)(?: ?(?:{_NUMBERING}))*"

@@ -101,17 +101,17 @@ def _before(location: str) -> str:
 TIME = QuantityKind("time", conversions("s", "min", "h", "d", "kh"), low=0.0)
 
 
-LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in"))
+LENGTH = QuantityKind("length", conversions("mm", "um", "m", "in", "mil"))
 
 
-_NO_UNIT = {"": UnitConversion(1.0)}
+NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
 
 
 _PERCENT = conversions("pct")["pct"]
 
 
 STRAIN = QuantityKind(
-    "strain", {**_NO_UNIT, **conversions("1", "pct"), "percent": _PERCENT, **conversions("permille", "microstrain")}
+    "strain", {**NUMBER.units, **conversions("1", "pct"), "percent": _PERCENT, **conversions("permille", "microstrain")}
 )
 
 
@@ -126,9 +126,6 @@ RATE = QuantityKind(
     high=1e3,
     open_interval=True,
 )
-
-
-NUMBER = QuantityKind("number", _NO_UNIT)
 
 
 STRESS = QuantityKind(

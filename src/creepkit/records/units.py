@@ -67,6 +67,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "um": _unit("length", 1e-3, "µm", "μm", "micron", "microns"),
         "nm": _unit("length", 1e-6),
         "in": _unit("length", 25.4, "inch", "inches", "in."),
+        "mil": _unit("length", 0.0254, "mils", "thou"),
         "mm2": _unit("area", 1.0, "mm²", "mm^2", "sq mm"),
         "cm2": _unit("area", 100.0, "cm²", "cm^2"),
         "in2": _unit("area", 645.16, "in²", "in^2", "sq in"),

@@ -10,8 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
+from creepkit.composition.mapping import CompositionMap, map_where_known
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
+from creepkit.screening.alloys import Compositions
 from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
@@ -143,7 +145,8 @@ class ReportContents:
 
     title : of the page. groups : one for each material. quality : what is suspect in the tests. exclusions : what was
     left out. temperature, forecasts, design, rupture, extractions : results of the other stages by a title of their
-    own, which is the name of their group or of their file. imposed : {test: what its
+    own, which is the name of their group or of their file. compositions : of the materials, where a table states them.
+    imposed : {test: what its
     instrument recorded}. exports : laws to download. failures : of stages.
     attachments : study, lock and data. notes : further remarks, one sentence each. data_citations : where the data
     were published, as a list of references has them. forecast_groups : {name of a forecast: name of its group}.
@@ -158,6 +161,7 @@ class ReportContents:
     design: Mapping[str, Design] = field(default_factory=dict)
     rupture: Mapping[str, RuptureAssessment] = field(default_factory=dict)
     extractions: Mapping[str, Extraction] = field(default_factory=dict)
+    compositions: Compositions | None = None
     imposed: Mapping[str, Imposed] = field(default_factory=dict)
     exports: tuple[ExportedFile, ...] = ()
     failures: tuple[StageFailure, ...] = ()
@@ -171,6 +175,11 @@ class ReportContents:
     def identified(self) -> list[ReportGroup]:
         """The groups of which a law was identified."""
         return [group for group in self.groups if group.fits]
+
+    @property
+    def composition(self) -> dict[str, CompositionMap]:
+        """{"": creep over compositions}, where those of enough materials are known; else {}."""
+        return map_where_known({one.name: one.result for one in self.identified}, self.compositions)
 
     def __post_init__(self) -> None:
         _freeze(self, "temperature", "forecasts", "design", "rupture", "extractions", "imposed", "forecast_groups")

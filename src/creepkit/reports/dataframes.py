@@ -7,6 +7,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from creepkit.composition.mapping import CompositionMap
 from creepkit.errors import HistoryError, ReportError, restated
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
@@ -103,6 +104,27 @@ def _(assessment: RuptureAssessment) -> tuple[Any, str]:
 def _(fit: Identification) -> tuple[Any, str]:
     names = ("value", "low", "high", "unit", "verdict")
     return [{"parameter": e.name, **{name: getattr(e, name) for name in names}} for e in fit.estimates], "parameter"
+
+
+@_rows.register
+def _(mapped: CompositionMap) -> tuple[Any, str]:
+    rows = []
+    for k, alloy in enumerate(mapped.alloys):
+        row: dict[str, Any] = {"alloy": alloy}
+        row |= {f"{e}_at%": 100 * x for e, x in zip(mapped.elements, mapped.contents[k], strict=True)}
+        for name, one in (("ln_rate", mapped.log_rate), ("stress_exponent", mapped.stress_exponent)):
+            (shared, shared_sd, share), (others, others_sd) = one.shared, one.left_out
+            row |= {name: one.values[k], f"{name}_sd": one.sd[k], f"{name}_shared": shared[k]}
+            row |= {
+                f"{name}_shared_sd": shared_sd[k],
+                f"{name}_by_others": others[k],
+                f"{name}_by_others_sd": others_sd[k],
+            }
+            row[f"{name}_weight_of_others"] = share[k]
+        for name, table in (("", mapped.laws.weights), ("_shared", mapped.laws.shared)):
+            row |= {f"{law}{name}": p for law, p in zip(mapped.laws.laws, table[k], strict=True)}
+        rows.append(row)
+    return rows, "alloy"
 
 
 @_rows.register

@@ -109,16 +109,16 @@ def _strain_text(history: History) -> str:
 
 def assumptions_text(histories: Sequence[History]) -> str:
     """One line for each thing that was assumed of tests, with the number of tests; numbers may differ among them."""
-    groups: dict[str, list[str]] = {}
-    for history in histories:
+    groups: dict[str, dict[int, str]] = {}
+    for k, history in enumerate(histories):
         assumed, lengths = history.labels.get("assumed", ""), lengths_by_default(history.specimen, history.geometry)
         listed = "; ".join(f"{name.replace('_', ' ')} {length:g}" for name, length in lengths.items())
         unsaid = [f"lengths by default: {listed} mm"] if lengths and "lengths by default" not in assumed else []
         for text in filter(None, [*assumed.split(", "), *unsaid]):
-            groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), []).append(text)
+            groups.setdefault(re.sub(r"\d[\w.:+-]*", "0", text), {}).setdefault(k, text)
     return "\n".join(
         f"assumed: {texts[0]}{' or the like' * (len(set(texts)) > 1)}{_count_text(len(texts), len(histories))}"
-        for texts in groups.values()
+        for texts in ([*said.values()] for said in groups.values())
     )
 
 

@@ -129,6 +129,7 @@ def report_contents(
         exports=exports,
         provenance=_provenance(groups, histories),
         notes=notes,
+        compositions=next((one.compositions for one in results if isinstance(one, ScreeningResult)), None),
         **others,
     )
 

@@ -13,7 +13,9 @@ without a rule; this rule is ours.)
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -168,6 +170,41 @@ def atomic_percent(weights: Mapping[str, float]) -> dict[str, float]:
 def resolve_compositions(compositions: Compositions | str | Path | None) -> Compositions | None:
     """The compositions themselves, or those of a table."""
     return read_compositions(compositions) if isinstance(compositions, (str, Path)) else compositions
+
+
+_CONTENT = re.compile(r"([A-Z][a-z]?)\W*(wt|at|mass|mol|atom|weight|m|a)?[-.\s]*%?\W*")
+"""An element and its unit in the head of a column: Ni, Ni [wt.%], Ni (at.%), Ni at%."""
+
+
+BALANCE = ("bal", "bal.", "balance", "rest", "basis", "base", "rem")
+"""What a table writes for the element that makes 100 %."""
+
+
+def compositions_of_labels(tests: Mapping[str, Sequence[History]]) -> Compositions | None:
+    """The compositions that tests carry as labels, such as the columns of a table of alloys; None where they do not.
+
+    tests : {alloy: its tests}. A content without a unit is in wt.%.
+    """
+    found = {}
+    for name, own in tests.items():
+        contents, atomic = dict[str, float](), False
+        labels = {label: text for test in own for label, text in test.labels.items()}
+        heads = {label: head for label in labels if (head := _CONTENT.fullmatch(label)) and head[1] in ATOMIC_WEIGHTS}
+        for label, head in heads.items():
+            with suppress(ValueError):
+                contents[head[1]] = float(labels[label].replace(",", ".") or 0.0)
+                atomic |= (head[2] or "").startswith(("at", "mol"))
+        balance = [head[1] for label, head in heads.items() if labels[label].strip().casefold() in BALANCE]
+        if len(balance) == 1:
+            contents[balance[0]] = 100.0 - sum(contents.values())
+        if (
+            contents
+            and min(contents.values()) >= 0.0
+            and ALLOWED_TOTAL[0] <= sum(contents.values()) <= ALLOWED_TOTAL[1]
+        ):
+            contents = {element: content for element, content in contents.items() if content > 0.0}
+            found[name] = contents if atomic else atomic_percent(contents)
+    return Compositions(found, "columns of elements") if found else None
 
 
 def read_compositions(path: str | Path) -> Compositions:

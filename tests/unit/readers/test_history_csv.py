@@ -38,8 +38,7 @@ def test_uniaxial_test_in_laboratory_units(read):
     assert history.name == "test_1"
     np.testing.assert_allclose(history.times, [0, 1800, 3600])
     np.testing.assert_allclose(history.outputs["strain"], [0, 0.0025, -0.0001])
-    assert history.temperature == pytest.approx(1123.15)
-    assert history.loading == StressSteps(((0.0, 60.0),), "stress")
+    assert (history.temperature, history.loading) == (pytest.approx(1123.15), StressSteps(((0.0, 60.0),), "stress"))
     assert history.elastic == Elastic(E=153e3, nu=0.3)
     assert (history.strain_measure, history.includes_elastic) == ("logarithmic", True)
     assert (history.alloy, history.specimen, dict(history.labels)) == ("Alloy 617", "uniaxial", {"heat": "X7"})
@@ -49,8 +48,7 @@ def test_uniaxial_test_in_laboratory_units(read):
 def test_what_was_not_said_is_assumed_and_recorded(read):
     history = read(CREEP + "time_s,strain_1\n0,0\n1,0.1\n")
     assert history.labels == {"assumed": "control load, strain_measure engineering, includes_elastic no"}
-    assert (history.strain_measure, history.includes_elastic) == ("engineering", False)
-    assert history.loading.control == "load"
+    assert (history.strain_measure, history.includes_elastic, history.loading.control) == ("engineering", False, "load")
 
 
 @pytest.mark.parametrize(
@@ -80,8 +78,7 @@ def test_stress_may_be_told_in_several_ways(read, head, loading):
 )
 def test_pressure_may_be_told_in_several_ways(read, head, loading):
     history = read(f"# temperature_K: 1000\n# {head}\ntime_s,amplitude_um,width_mm,shape\n150,80,3.6,2\n300,90,3.6,2\n")
-    assert history.specimen == "bulge"
-    assert list(history.outputs) == ["amplitude", "width", "shape"]
+    assert (history.specimen, list(history.outputs)) == ("bulge", ["amplitude", "width", "shape"])
     np.testing.assert_allclose(history.outputs["amplitude"], [0.08, 0.09])
     assert history.loading.program() == loading.program()
     assert isinstance(history.loading, type(loading))
@@ -110,8 +107,7 @@ def test_temperature_steps_and_programs(read):
 
 def test_frames_of_one_time_become_their_mean_and_are_counted(read):
     history = read(CREEP + "time_s,strain_1,strain_sd_1\n0,0,1e-4\n5,0.1,1e-4\n5,0.2,3e-4\n5,0.6,2e-4\n9,1,1e-4\n")
-    np.testing.assert_allclose(history.times, [0, 5, 9])
-    np.testing.assert_allclose(history.outputs["strain"], [0, 0.3, 1])
+    np.testing.assert_allclose([history.times, history.outputs["strain"]], [[0, 5, 9], [0, 0.3, 1]])
     np.testing.assert_allclose(history.standard_deviation["strain"], [1e-4, 2e-4, 1e-4])
     assert history.labels["merged_frames"] == "2"
 
@@ -124,8 +120,7 @@ def test_words_of_another_laboratory(read):
     reader = HistoryCsvReader("lab", "our laboratory", columns=("Zeit_h", "Dehnung_pct"), vocabulary=words)
     text = "# Pruefspannung_MPa: 60\n# temperature_C: 850\nZeit_h,Dehnung_pct,T1_C,T2_C\n0,0,850,852\n1,2,850,851\n"
     history = read(text, reader)
-    assert history.times.tolist() == [0.0, 3600.0]
-    assert history.loading.steps == ((0.0, 60.0),)
+    assert (history.times.tolist(), history.loading.steps) == ([0.0, 3600.0], ((0.0, 60.0),))
 
 
 def test_reader_with_columns_accepts_only_files_that_have_them(tmp_path):
@@ -152,8 +147,7 @@ def read_noisy(folder: Path, text: str) -> ck.History:
 
 def test_it_is_read_in_any_order_and_written(tmp_path: Path) -> None:
     test = read_noisy(tmp_path, "amplitude width -0.31;shape   amplitude 0.2")
-    assert test.noise_correlation == {("amplitude", "width"): -0.31, ("amplitude", "shape"): 0.2}
-    assert test.labels == {}
+    assert (test.noise_correlation, test.labels) == ({("amplitude", "width"): -0.31, ("amplitude", "shape"): 0.2}, {})
     written = ck.write_history(test, tmp_path / "again.csv")
     assert "# noise_correlation: amplitude width -0.31; amplitude shape 0.2\n" in written.read_text()
     assert ck.read_histories(written)[0].noise_correlation == test.noise_correlation
@@ -220,9 +214,7 @@ def test_round_trip(history: History, tmp_path: Path):
     path = write_history(history, tmp_path / "x.csv")
     (back,) = HISTORY_CSV.read(path)
     assert_same(history, back)
-    assert back.source == str(path)
-    assert history_text(back) == path.read_text()
-    assert names_in(tmp_path) == ["x.csv"]
+    assert (back.source, history_text(back), names_in(tmp_path)) == (str(path), path.read_text(), ["x.csv"])
 
 
 def test_modulus_of_temperature_is_written_at_the_temperature_of_the_test(tmp_path):

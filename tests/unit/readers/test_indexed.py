@@ -37,28 +37,22 @@ def files(index: str = "", frames: str = "") -> dict[str, str]:
 
 def test_one_table_for_all_tests(tmp_path):
     first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": INDEX, "curves.csv": CURVES}))
-    assert (first.name, second.name) == ("a/1", "a/2")
-    assert first.outputs["strain"].tolist() == [0.0, 0.1]
-    assert second.times.tolist() == [0.0, 9.0]
-    assert first.elastic.E == 149000.0
-    assert first.temperature == 1173.15
+    assert (first.name, second.name, first.alloy) == ("a/1", "a/2", "alloy9")
+    assert (first.outputs["strain"].tolist(), second.times.tolist()) == ([0.0, 0.1], [0.0, 9.0])
+    assert (first.elastic.E, first.temperature) == (149000.0, 1173.15)
     assert (first.rupture_time, first.labels["assumed"].split(", ")[-1]) == (10.0, "rupture at the last frame")
     assert (second.rupture_time, second.unruptured, second.end_known) == (None, False, False)
-    assert first.alloy == "alloy9"
     assert first.source.endswith("curves.csv (a/1)")
 
 
 def test_one_file_a_test_in_the_order_of_the_index(tmp_path):
     made = folder(tmp_path, files())
     first, second = INDEXED_FILES.read(made)
-    assert (first.name, second.name) == ("B", "A")
-    np.testing.assert_allclose(first.times, [0, 7200])
-    np.testing.assert_allclose(first.outputs["strain"], [0, 0.005])
-    assert first.loading.steps == ((0.0, 230.0),)
-    assert first.temperature == pytest.approx(1253.15)
-    assert (first.rupture_time, first.unruptured) == (pytest.approx(78.7 * 3600), False)
-    assert (second.rupture_time, second.unruptured) == (None, True)
-    assert first.source == str(made / "B_creep.csv")
+    assert (first.name, second.name, first.source) == ("B", "A", str(made / "B_creep.csv"))
+    np.testing.assert_allclose([first.times, first.outputs["strain"]], [[0, 7200], [0, 0.005]])
+    assert (first.loading.steps, first.temperature) == (((0.0, 230.0),), pytest.approx(1253.15))
+    ends = [(one.rupture_time, one.unruptured) for one in (first, second)]
+    assert ends == [(pytest.approx(78.7 * 3600), False), (None, True)]
 
 
 def test_any_file_of_the_folder_leads_to_it(tmp_path):

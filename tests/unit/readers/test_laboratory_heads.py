@@ -31,8 +31,7 @@ def test_a_german_table(tmp_path: Path) -> None:
     file = tmp_path / "P1.csv"
     file.write_text(GERMAN, encoding="latin-1")
     (test,) = ck.read_histories(file, ignore=["Datum", "Last", "T1"])
-    assert test.loading.program().values.tolist() == [110.0]
-    assert test.temperature == pytest.approx(893.15)
+    assert (test.loading.program().values.tolist(), test.temperature) == ([110.0], pytest.approx(893.15))
     np.testing.assert_allclose(test.times, [0, 13.33 * 3600, 30.85 * 3600])
     np.testing.assert_allclose(test.outputs["strain"], [0, 2.45e-4, 4e-4])
     assert (test.labels["heat"], test.labels["operator"], test.operator) == ("K7", "Müller", "")
@@ -83,8 +82,7 @@ def test_sheets_named_by_temperature(tmp_path: Path) -> None:
     np.testing.assert_allclose(tests[3].outputs["strain"], 1.3e-3 * np.array([0.1, 1.0, 2.0]))
     labels = tests[1].labels
     assert "temperature 575 °C from sheet '575°C' row 1" in labels["assumed"]
-    assert labels["beside line 9"] == "13.05. power failure 1 h"
-    assert labels["cell C5"] == "thermocouple 2 exchanged"
+    assert (labels["beside line 9"], labels["cell C5"]) == ("13.05. power failure 1 h", "thermocouple 2 exchanged")
     assert labels["sheet notes"] == "heat 4711, normalised 1060 °C, tempered 770 °C"
     assert labels["operator"] == "day shift"
 
@@ -127,6 +125,41 @@ def test_sources_that_disagree_and_numbers_of_other_things(tmp_path: Path) -> No
         (tmp_path / "x.csv").write_text(f"# temperature_C: 600\n# stress_MPa: 120\n{title}\n{FRAMES}")
         (test,) = ck.read_histories(tmp_path / "x.csv")
         assert (test.condition, test.labels["line 3"]) == ("600 °C, 120 MPa", title)
+
+
+BAR = "# temperature_C: 600\n# stress_MPa: 120\n"
+DATES = "Tag;Uhrzeit;Dehnung (%)\n12.03.2021;9:25;0\n;15:25;0,05\n13.03.2021;9.25 Uhr;0,1\n"
+SAID = {
+    "SAC_75C": ("# stress_MPa: 12\ntime_h,strain_pct\n0,0\n9,0.1\n", 348.15, 9.0, "engineering"),
+    "mil": (BAR + "# gauge_length_in: 2\nTime (h),Extension (mil)\n0,0\n9,2\n", 873.15, 9.0, "engineering"),
+    "true": (BAR + "# Strain: DIC, true strain\nTime (h),Strain (%)\n0,0\n9,0.1\n", 873.15, 9.0, "logarithmic"),
+    "clock": (BAR + DATES, 873.15, 24.0, "engineering"),
+}
+REMARKS = {
+    "temp. raised from 600 to 620 C": 'temperature_steps = "0 s 873.15 K; 15 h 893.15 K"',
+    "5 h cold, unloaded": 'stress_steps = "0 s 120 MPa; 10 h 0 MPa; 15 h 120 MPa"',
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_what_heads_and_names_say(tmp_path: Path, name: str) -> None:
+    (tmp_path / f"{name}.csv").write_text(SAID[name][0], "utf-8")
+    (test,) = ck.read_histories(tmp_path)
+    assert test.outputs["strain"][-1] == pytest.approx(1e-3)
+    assert (test.temperature, test.times[-1] / 3600, test.strain_measure) == SAID[name][1:]
+
+
+@pytest.mark.parametrize("remark", REMARKS)
+def test_a_remark_on_a_change_or_a_pause_is_asked_for(tmp_path: Path, remark: str) -> None:
+    rows = f"0,0,\n10,0.1,\n15,0.2,{remark}\n20,0.3,\n"
+    (tmp_path / "a.csv").write_text(f"{BAR}Time (h),Strain (%),Remarks\n{rows}")
+    with pytest.raises(Question) as caught:
+        ck.read_histories(tmp_path)
+    assert caught.value.entry(caught.value.choices[0]) == REMARKS[remark]
+    (tmp_path / "tests.toml").write_text(f'["a.csv"]\n{REMARKS[remark]}\n')
+    (test,) = ck.read_histories(tmp_path)
+    levels = [p.at([36e3 + 1, 54e3 + 1]).tolist() for p in (test.temperature_program(), test.loading.program())]
+    assert levels in ([[873.15, 893.15], [120, 120]], [[873.15, 873.15], [0, 120]])
 
 
 HEADS_IN_ANY_ORDER = {

@@ -77,8 +77,7 @@ def test_inconel_625_bulges():
     first, jumped = tests["test_01"], tests["test_11"]
     assert first.loading == PressureJump(8.0, 8.0, 10800.0)
     assert (jumped.loading.P1, jumped.loading.P2, jumped.loading.Tj) == pytest.approx((8.0, 10.0, 14580.0))
-    assert first.temperature == pytest.approx(988.91)
-    assert first.elastic.E == pytest.approx(108425.0)
+    assert (first.temperature, first.elastic.E) == (pytest.approx(988.91), pytest.approx(108425.0))
     assert [first.outputs[name][0] for name in ("amplitude", "width", "shape")] == [0.069047753, 3.6917447, 1.98580857]
     assert first.labels["specimen"] == "dimple bulge, wrought Inconel 625"
 
@@ -87,8 +86,7 @@ def test_alloy_617_readings_of_one_time_are_merged(alloy617):
     merged = [history.labels.get("merged_frames") for history in alloy617.values()]
     assert Counter(merged) == {None: 84, "1": 10}
     ruptured = alloy617["inl_2/AirBase_750_118_a"]  # at 12040600 s: 0.21372, then 0.22174
-    assert ruptured.times[-1] == 12040600.0
-    assert ruptured.outputs["strain"][-1] == pytest.approx(0.21372, abs=1e-12)  # that before rupture
+    assert (ruptured.times[-1], ruptured.outputs["strain"][-1]) == (12040600.0, pytest.approx(0.21372, abs=1e-12))
     repeated = alloy617["kaeri_2/HeBase_850_50_b"]  # 0.34191 twice
     assert repeated.outputs["strain"][-1] == pytest.approx(0.34191, abs=1e-12)
 
@@ -104,5 +102,4 @@ def test_alloy_617_holds_four_tests_twice(alloy617):
 
 def test_frames_of_the_unloading_bulges_are_not_used():
     after = {name: history.times[~history.used].tolist() for name, history in read("dabi/in625").items()}
-    assert after.pop("test_11") == [28950.0, 29100.0]
-    assert set(map(tuple, after.values())) == {(14550.0,)}
+    assert (after.pop("test_11"), set(map(tuple, after.values()))) == ([28950.0, 29100.0], {(14550.0,)})

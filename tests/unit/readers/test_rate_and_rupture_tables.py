@@ -27,16 +27,13 @@ def read(tmp_path, text, name="table.csv", encoding="utf-8"):
 
 def test_a_table_of_rates_and_rupture_times(tmp_path):
     first, second, third = read(tmp_path, TABLE)
-    assert [h.name for h in (first, second, third)] == ["A1", "A2", "A3"]
-    assert first.outputs == {}
+    assert ([h.name for h in (first, second, third)], first.outputs) == (["A1", "A2", "A3"], {})
     assert first.minimum_rate == pytest.approx(2.1e-6 / 3600)
     assert first.rupture_time == first.times[-1] == 8200 * 3600
     assert (second.minimum_rate, second.rupture_time, second.unruptured) == (None, None, True)
-    assert second.times[-1] == 1e4 * 3600
-    assert (third.times[-1], third.end_known) == (UNKNOWN_DURATION, False)
+    assert (second.times[-1], third.times[-1], third.end_known) == (1e4 * 3600, UNKNOWN_DURATION, False)
     assert (first.temperature, first.loading, first.alloy) == (1023.15, constant_stress(120.0, "stress"), "Alloy X")
-    assert first.labels["heat"] == "X7"
-    assert first.labels["grain size"] == "40"
+    assert (first.labels["heat"], first.labels["grain size"]) == ("X7", "40")
     assert third.source.endswith("table.csv (A3)")
 
 
@@ -44,8 +41,7 @@ def test_the_same_in_another_dialect_and_without_names(tmp_path):
     text = "Stress / MPa;T (°C);Minimum creep rate (1/s);Time to rupture in h;End\n120,5;750;2,1e-9;8200;ruptured\n" \
            "100;750;1e-9;9000;running\n"  # fmt: skip
     first, second = read(tmp_path, text, encoding="latin-1")
-    assert first.name == "table 2"
-    assert first.loading.program().values[0] == 120.5
+    assert (first.name, first.loading.program().values[0]) == ("table 2", 120.5)
     assert (first.rupture_time, second.unruptured, second.times[-1]) == (8200 * 3600.0, True, 9000 * 3600.0)
     assert "control load" in first.labels["assumed"]
 

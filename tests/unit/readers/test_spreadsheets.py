@@ -49,8 +49,7 @@ def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
     }
     first, second = read(workbook(tmp_path / "bars.xlsx", sheets))
     assert (first.name, second.name) == ("A1", "A2")
-    assert (first.condition, second.condition) == ("850 °C, 60 MPa", "860 °C, 80 MPa")
-    assert second.labels["heat"] == "X8"
+    assert (first.condition, second.condition, second.labels["heat"]) == ("850 °C, 60 MPa", "860 °C, 80 MPa", "X8")
     assert "sheet 'Notes' not read as it has no column of time" in first.labels["assumed"]
     sheets["Conditions"].append(["A3", 80, 860, "X8"])
     with pytest.raises(HistoryError, match="sheet 'Conditions', row 4: 'A3' has conditions, but no sheet or column"):
@@ -107,8 +106,7 @@ def test_one_column_a_test_below_merged_quantity(tmp_path: Path):
         [1, 0.5, 0.7],
     ]
     first, second = read(workbook(tmp_path / "x.xlsx", {"Sheet1": rows}, merging("B2:C2", "B3:C3", "A3:A4")))
-    assert (first.name, second.name) == ("A1", "A2")
-    assert second.condition == "860 °C, 80 MPa".replace("860", "850")
+    assert (first.name, second.name, second.condition) == ("A1", "A2", "860 °C, 80 MPa".replace("860", "850"))
     assert "holds for all" not in second.labels["assumed"]
 
 

@@ -99,8 +99,7 @@ def test_titles_comments_blank_lines_and_footers(read):
         "// a remark\n1,5;0,5;\n\n2,5;0,75\nEnd of the record\n"
     )
     (history,) = read(text)
-    assert history.times.tolist() == [0.0, 5400.0, 9000.0]
-    assert history.labels["line 1"] == "Creep test of Monday"
+    assert (history.times.tolist(), history.labels["line 1"]) == ([0.0, 5400.0, 9000.0], "Creep test of Monday")
     assert "line 14 is a remark (End of the record)" in history.labels["assumed"]
 
 
@@ -236,8 +235,7 @@ def test_a_canonical_file_that_a_spreadsheet_saved(read):
         '# temperature_C: 850;\n"# stress_steps: 0 s 60.5 MPa; 1 h 70 MPa";\n# label note: a, b;\ntime_h;strain_pct\n'
     )
     (history,) = read(text + "0;0\n2,5;0,5\n")
-    assert history.loading.steps == ((0.0, 60.5), (3600.0, 70.0))
-    assert history.labels["note"] == "a, b"
+    assert (history.loading.steps, history.labels["note"]) == (((0.0, 60.5), (3600.0, 70.0)), "a, b")
 
 
 def test_what_empty_cells_of_conditions_leave_unknown_is_said(tmp_path):

@@ -121,8 +121,7 @@ def test_two_transducers_are_asked_about_with_their_mean_first(tmp_path: Path) -
 def test_one_cold_reading_without_load_is_left_out_and_several_are_a_pause(tmp_path: Path) -> None:
     """No condition of the test is that of a furnace that failed, and when it cooled down needs no answer."""
     one, three = (_frame_with_a_pause(tmp_path, cold=cold) for cold in (1, 3))
-    assert one.temperature == pytest.approx(873.15)
-    assert one.times.size == TIMES.size
+    assert (one.temperature, one.times.size) == (pytest.approx(873.15), TIMES.size)
     assert "the reading without load at 101 h left out" in one.labels["assumed"]
     assert three.loading.program().at(np.array([3.65e5]))[0] == pytest.approx(0.0, abs=1.0)
     assert three.temperature.at(np.array([1e5, 3.68e5, 1e6])) == pytest.approx([873.15, 453.15, 873.15])  # type: ignore[union-attr]
@@ -176,7 +175,6 @@ def test_a_run_out_whose_time_stands_in_a_remark_that_was_answered(tmp_path: Pat
     )
     (tmp_path / "tests.toml").write_text('["z.csv"]\nended = {"Laufzeit 40215 h" = "stopped"}\n')
     first, second = ck.read_histories(tmp_path / "z.csv")
-    assert first.temperature == pytest.approx(873.15)
-    assert first.rupture_time == pytest.approx(9783 * 3600)
+    assert (first.temperature, first.rupture_time) == (pytest.approx(873.15), pytest.approx(9783 * 3600))
     assert second.unruptured
     assert second.times[-1] == pytest.approx(40215 * 3600)

@@ -31,6 +31,7 @@ from creepkit.reports.blocks import (
     sentence,
     typeset,
 )
+from creepkit.reports.composition import composition_blocks, map_sentence
 from creepkit.reports.description import rejected, tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
@@ -301,6 +302,7 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
     stages: dict[str, tuple[str, Mapping[str, Any], Callable[..., list[Block]], Callable[[Any], str]]] = {
         "extraction": ("Extraction from camera frames", contents.extractions, _extraction_blocks, _outputs_text),
         "imposed": (records, imposed, _imposed_blocks, lambda one: f"lag of the clocks {one.alignment.lag:.4g} s"),
+        "composition": ("Creep over compositions", contents.composition, composition_blocks, map_sentence),
         "temperature": (
             "Trends with temperature",
             contents.temperature,
