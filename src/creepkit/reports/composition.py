@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_MOVED = 5
-"""Alloys whose values the others change most, that are listed."""
+CHANGED = 0.05
+"""Of ln of a rate, from which on it is said that the others change it."""
 
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 3**0.5 / 2.0]])
@@ -56,18 +56,22 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
     lines = [
         f"rates are compared at {at}; by an alloy's own tests they are known to a factor of {np.exp(noise):.2f}",
         f"stress exponents of alloys left out are predicted within {exponent.left_out_error:.2g}",
-        f"{100 * rate.left_out_coverage:.0f} % of the rates lie in the 95 % intervals that the other alloys give them; "
-        f"alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
-        f"in short, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
+        f"{round(rate.left_out_coverage * len(rate.values))} of {len(rate.values)} rates lie in the 95 % intervals that "
+        f"the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
+        f"nearly, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
     ]
+    proposals = mapped.propose()
+    lowest = min(one.rate[0] for one in proposals)
+    beyond = "these rates are below all that were measured: an extrapolation that only a test can confirm"
     lines += [f"left out: {name}: {why}" for name, why in mapped.left_out.items()]
     title = f"Creep rate over compositions{of}"
     description = f"{title}: a triangle of the elements that vary most, and alloys left out over their own rates."
     return [
         *([] if figures is None else [figures.picture(lambda: composition_figure(mapped), title, description, title)]),
         Items(lines),
-        _shared_table(mapped),
-        proposals_table(mapped.propose(), "the compositions to make next for the lowest creep rate"),
+        *_shared_blocks(mapped),
+        proposals_table(proposals, "the compositions to make next for the lowest creep rate"),
+        *([Paragraph(beyond)] if lowest < float(np.exp(rate.values.min())) else []),
     ]
 
 
@@ -77,19 +81,21 @@ def formula_text(regression: CompositionRegression) -> str:
     return str(sympy.sstr(sympy.Add(*terms, evaluate=False), order="none")).replace("*", " ")
 
 
-def _shared_table(mapped: CompositionMap) -> Table:
-    """The alloys whose rates the others change most, and those to whom they give another law."""
+def _shared_blocks(mapped: CompositionMap) -> list[Block]:
+    """The alloys to whom the others give another rate, by more than CHANGED, or another law; else that there are none."""
     rate, laws = mapped.log_rate, mapped.laws
     value, sd, share = rate.shared
-    other_law = laws.shared.argmax(axis=1) != laws.weights.argmax(axis=1)
-    order = np.argsort(-np.abs(value - rate.values) - 1e3 * other_law)
+    changed = np.abs(value - rate.values) > CHANGED
+    changed |= laws.shared.argmax(axis=1) != laws.weights.argmax(axis=1)
     rows = []
-    for k in order[: max(MOST_MOVED, int(other_law.sum()))]:
+    for k in sorted(np.flatnonzero(changed), key=lambda alloy: -abs(value[alloy] - rate.values[alloy])):
         low, high = (PERCENT_PER_HOUR * float(np.exp(value[k] + side * 1.96 * sd[k])) for side in (-1, 1))
         own, both = (PERCENT_PER_HOUR * float(np.exp(one[k])) for one in (rate.values, value))
         by = [laws.laws[int(one[k].argmax())] for one in (laws.weights, laws.shared)]
         shown = f"{number(both, 3)} [{number(low, 3)}, {number(high, 3)}]"
         rows.append((mapped.alloys[k], number(own, 3), shown, f"{100 * share[k]:.0f} %", by[0], by[1]))
+    if not rows:
+        return [Paragraph("what alloys show by their own tests, the others change by less than 5 %")]
     columns = (
         "alloy",
         "rate by its tests, %/h",
@@ -98,7 +104,7 @@ def _shared_table(mapped: CompositionMap) -> Table:
         "law by its tests",
         "law with the others",
     )
-    return Table("the alloys that the others change most", columns, rows)
+    return [Table("alloys whose own tests say less than their neighbours do", columns, rows)]
 
 
 def proposals_table(proposals: Sequence[PredictedAlloy], caption: str) -> Table:
@@ -180,7 +186,7 @@ def _name_corners(axes: Axes, mapped: CompositionMap, shown: Ints, rest: Floats)
         )
     held = [f"{e} {100 * x:.2g} at.%" for e, x in zip(mapped.elements, rest, strict=True) if x > 0]
     if held:
-        axes.set_title(f"the rest: {', '.join(held)}", fontsize=9, pad=16)
+        axes.set_title(f"colours at {', '.join(held)}; marks at their own, filled by their rates", fontsize=9, pad=16)
     axes.set(aspect="equal", xlim=(-0.12, 1.12), ylim=(-0.1, 0.98))
     axes.axis("off")
 
