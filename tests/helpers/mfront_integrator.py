@@ -70,7 +70,8 @@ class Block:
         self.states = [*declared(text, "StateVariable")][1:]
         self.size = 7 + len(self.states)
         self.modulus = ELASTIC.E / (units or Units()).megapascals
-        self._integrate = compile_cpp(gxx, folder, self._class(text)).integrate
+        self._library = compile_cpp(gxx, folder, self._class(text))
+        self._library.ended.argtypes = [ctypes.c_int, *[ctypes.c_double] * 3]
 
     def _class(self, text):
         members = [f"real {name} = {value};" for name, value in declared(text, "Parameter").items()]
@@ -78,7 +79,10 @@ class Block:
         scalars = ["p", *self.states]
         blocks = [f"df{a}_dd{b}" for a in scalars for b in scalars]
         members += [f"Stensor df{s}_ddeel, dfeel_dd{s};" for s in scalars] + [f"real {b};" for b in blocks]
-        integrator = re.search(r"^@Integrator \{\n(.*?)^\}", text, re.MULTILINE | re.DOTALL)[1]
+        integrator, convergence, increment = (
+            re.search(rf"^@{keyword} \{{\n(.*?)^\}}", text, re.MULTILINE | re.DOTALL)[1]
+            for keyword in ("Integrator", "AdditionalConvergenceChecks", "APosterioriTimeStepScalingFactor")
+        )
         starts = [f"{s} = state[{k}]; d{s} = unknown[{6 + k}]; f{s} = d{s};" for k, s in enumerate(scalars)]
         starts += [f"df{a}_dd{b} = {float(a == b)};" for a in scalars for b in scalars]
         outs = [f"residual[{6 + k}] = f{s};" for k, s in enumerate(scalars)]
@@ -94,6 +98,8 @@ class Block:
                 "struct Behaviour : BehaviourData {",
                 *members,
                 f"void integrator() {{\n{integrator}}}",
+                f"bool ended(double error) {{\nbool converged = error < 1e-14;\n{convergence}return converged;\n}}",
+                f"pair<bool, real> increment() {{\n{increment}return {{true, 1.0}};\n}}",
                 "void run(const double *state, const double *unknown, double *residual, double (*jacobian)"
                 f"[{self.size}]) {{",
                 *starts,
@@ -107,6 +113,14 @@ class Block:
                 "b.run(state, unknown, residual, jacobian); b.finish(residual);",
                 "for (int i = 0; i != 6; ++i) for (int j = 0; j != 6; ++j) jacobian[i][j] = b.dfeel_ddeel(i, j);",
                 "}",
+                'extern "C" bool ended(int iter, double error, double size, double change) {',
+                "Behaviour b{}; b.iter = iter; b.zeros = size; b.delta_zeros = change; return b.ended(error);",
+                "}",
+                'extern "C" bool kept(const double *state, const double *given, const double *unknown) {',
+                "Behaviour b{}; b.start(given, unknown);",
+                *(f"b.{s} = state[{k}] + unknown[{6 + k}]; b.d{s} = unknown[{6 + k}];" for k, s in enumerate(scalars)),
+                "return b.increment().first;",
+                "}",
             ]
         )
 
@@ -114,17 +128,20 @@ class Block:
         """Residuals and Jacobian at an estimate of the increments."""
         given = [*eel, *(np.zeros(6) if deto is None else deto), self.modulus, 0.3, theta, dt, T, 0.0, elapsed]
         residual, jacobian = (ctypes.c_double * self.size)(), (ctypes.c_double * self.size**2)()
-        pack = [(ctypes.c_double * len(v))(*v) for v in (state, given, unknown)]
-        self._integrate(pack[0], pack[1], pack[2], residual, jacobian)
+        self._packed = [(ctypes.c_double * len(v))(*v) for v in (state, given, unknown)]
+        self._library.integrate(*self._packed, residual, jacobian)
         return np.array(residual), np.reshape(jacobian, (self.size, self.size))
 
     def step(self, eel, state, dt, guess=0.0, **more):
-        """Newton's method for one increment: eel, state and how many iterations it took."""
-        unknown = np.zeros(self.size)
+        """Newton's method for one increment: eel, state and how many iterations it took; None if it is given back."""
+        unknown, change = np.zeros(self.size), np.inf
         unknown[6] = guess
         for iteration in range(100):
             residual, jacobian = self(unknown, eel, state, dt, **more)
-            if np.abs(residual).max() < 1e-14:
-                return eel + unknown[:6], state + unknown[6:], iteration
-            unknown = unknown - np.linalg.solve(jacobian, residual)
+            error = np.linalg.norm(residual) / self.size
+            if self._library.ended(iteration, error, np.linalg.norm(unknown), change):
+                kept = self._library.kept(*self._packed)
+                return (eel + unknown[:6], state + unknown[6:], iteration) if kept else None
+            correction = np.linalg.solve(jacobian, residual)
+            unknown, change = unknown - correction, np.linalg.norm(correction)
         raise AssertionError("no convergence in the iterations that the file allows")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.sampling.conditions import TimeGrid, planned_test
+from creepkit.sampling.conditions import TimeGrid
 from creepkit.sampling.domains import DrawCriterion, OutcomeCriterion, SamplingDomain
 from creepkit.sampling.rates import Draws, additive_recurrence_step
 
@@ -121,8 +121,3 @@ def strain(values, conditions, times):
 def stress_of(row, seed=0, design=None):
     """The first stress of one row of the sequence."""
     return float((design or Planted()).draw(row, 1, seed).condition("stress_1")[0])
-
-
-def planned(data, row):
-    """The test of a row, made anew."""
-    return planned_test(BAR, data.conditions_of(row), GRID)

@@ -6,10 +6,8 @@ import numpy as np
 
 from creepkit.records import History, constant_stress
 from creepkit.specimens.uniaxial import Uniaxial
-from helpers.literature_laws import EQUATIONS
 
 BAR = Uniaxial()
-OMEGA = EQUATIONS["MPC Omega"]
 LIFE_FRACTIONS = np.concatenate([np.geomspace(3e-3, 0.3, 10), 1 - np.geomspace(0.6, 3e-3, 14)])
 """Times of frames over the time to rupture."""
 SCATTER = {"rate": 0.15, "life": 0.08, "noise": 2e-5}

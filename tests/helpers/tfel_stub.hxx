@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 using namespace std;
@@ -121,19 +122,25 @@ inline double computeLambda(double young, double nu) { return young * nu / ((1 +
 
 // What the Implicit DSL and the brick StandardElasticity set before @Integrator: Hooke's law at t + theta dt, the split of
 // the strain, and the identity as Jacobian.
+using StrainStensor = Stensor;
+using OutOfBoundsException = std::runtime_error;
+inline double norm(double a) { return fabs(a); }
 struct BehaviourData {
-  double young, nu, theta, dt, T, dT;
-  Stensor sig, feel;
+  double young, nu, theta, dt, T, dT, zeros = 0, delta_zeros = 0;
+  int iter = 0, iterMax = 100;
+  Stensor sig, feel, eel, deel;
   Stensor4 dfeel_ddeel;
   void start(const double* given, const double* unknown) {
     young = given[12], nu = given[13], theta = given[14], dt = given[15], T = given[16], dT = given[17];
-    Stensor eel;
+    Stensor middle;
     for (int i = 0; i != 6; ++i) {
-      eel(i) = given[i] + theta * unknown[i];
+      deel(i) = unknown[i];
+      eel(i) = given[i] + unknown[i];
+      middle(i) = given[i] + theta * unknown[i];
       feel(i) = unknown[i] - given[6 + i];
       dfeel_ddeel(i, i) = 1;
     }
-    sig = computeLambda(young, nu) * trace(eel) * Stensor::Id() + 2 * computeMu(young, nu) * eel;
+    sig = computeLambda(young, nu) * trace(middle) * Stensor::Id() + 2 * computeMu(young, nu) * middle;
   }
   void finish(double* residual) const {
     for (int i = 0; i != 6; ++i) residual[i] = feel(i);

@@ -23,7 +23,7 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2680,
+    "exporters": 2738,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
@@ -48,11 +48,11 @@ BUDGET = {
     "specimens": 3203,
     "studies": 2770,
     "surrogates": 1361,
-    "testing": 1777,
+    "testing": 1774,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_101
+TESTS = 30_117
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -40,8 +40,8 @@ _MATH_FUNCTIONS = """
 acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p log2
 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint round
 lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin fma cabs cacos cacosh carg
-casin casinh catan catanh ccos ccosh cexp cimag clog conj cpow cproj creal csin csinh csqrt ctan ctanh gamma j0 j1 jn y0
-y1 yn drem scalb significand exp10 pow10
+casin casinh catan catanh ccos ccosh cexp cimag clog conj cpow cproj creal csin csinh csqrt ctan ctanh gamma j0 j1 jn
+y0 y1 yn drem scalb significand exp10 pow10 fadd fdiv fmul fsub ffma fsqrt llogb nextup nextdown roundeven sincos
 """
 """math.h and complex.h, with what Unix adds: compilers know these as functions, included or not; also with f and l."""
 
@@ -49,8 +49,11 @@ y1 yn drem scalb significand exp10 pow10
 _LIBRARY_NAMES = """
 fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater isunordered
 signgam float_t double_t INFINITY NAN HUGE_VAL abort atexit bsearch calloc div exit free getenv labs ldiv malloc qsort
-rand realloc srand strtod system isalpha isdigit isspace tolower toupper fclose fopen printf putc puts remove rename
-scanf sprintf memchr memcpy memset strcat strchr strcmp strcpy strlen alloca ffs fork gettext index rindex
+rand realloc srand strtod system aligned_alloc at_quick_exit atof atoi atol atoll clearenv drand48 ecvt fcvt fd_set
+finite gcvt getpt initstate iszero lldiv llabs mblen mktemp on_exit pselect putenv quick_exit random realpath select
+setenv setstate srandom strtof strtol strtold uint ulong unlockpt ushort valloc isalpha isdigit isspace tolower toupper
+fclose fopen printf putc puts remove rename scanf sprintf memchr memcpy memset strcat strchr strcmp strcpy strlen
+alloca ffs fork gettext index rindex
 """
 """Macros and types of math.h, and functions of other headers that compilers know without them."""
 
@@ -68,7 +71,7 @@ _WIDTHS = ("", "f", "l", "f16", "f32", "f64", "f128", "f32x", "f64x")
 
 
 C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES} {_MACROS}".split()).union(
-    (name + width for name in _MATH_FUNCTIONS.split() for width in ("", "f", "l")),
+    (name + width for name in _MATH_FUNCTIONS.split() for width in _WIDTHS),
     (f"M_{name}{width}" for name in _MATH_CONSTANTS.split() for width in _WIDTHS),
     (name + width.upper() for name in ("HUGE_VAL", "HUGE_VAL_", "SNAN") for width in _WIDTHS),
 )

@@ -222,12 +222,13 @@ def card_heading(source: LawWithValues, marker: str, lines: Iterable[str]) -> li
 class CodeInput:
     """An exporter of the input text of a code, with the creep laws that the code has built in.
 
-    code : the code, or its law, in words. alternative : what to do where it has no such law. marker : of comments.
-    first_lines : what must stand before the heading.
+    code : the code, or its law, in words. alternative : what to do where it has no such law, which knows no stress of
+        `unknown_there`. marker : of comments. first_lines : what must stand before the heading.
     """
 
     code: ClassVar[str]
     alternative: ClassVar[str]
+    unknown_there: ClassVar[tuple[sympy.Symbol, ...]] = (principal_stress,)
     marker: ClassVar[str]
     first_lines: ClassVar[tuple[str, ...]] = ()
 
@@ -247,8 +248,9 @@ class CodeInput:
 
     def way_out(self, source: LawWithValues) -> str:
         """What to do with a law that the code does not have: a target that takes it."""
-        principal = source.without_inactive_terms().law.uses(principal_stress)
-        return "export it as 'mfront', which has the largest principal stress" if principal else self.alternative
+        law = source.without_inactive_terms().law
+        multiaxial = any(law.uses(one) for one in self.unknown_there)
+        return "export it as 'mfront', which has the principal and the mean stress" if multiaxial else self.alternative
 
 
 def exp_in_range(logarithm: float, quantity: str, source: LawWithValues) -> float:

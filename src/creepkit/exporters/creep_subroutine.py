@@ -344,6 +344,12 @@ class AbaqusCreepSubroutine(CreepSubroutine):
         }
 
 
+CALCULIX_CETOL = (
+    "CETOL is a strain, the difference that the rates at both ends of an increment may make: one above what an "
+    "increment creeps limits nothing, so 1e-2 and 1e-4 may give one run. Bound increments where the rate falls fast."
+)
+
+
 class CalculixCreepSubroutine(CreepSubroutine):
     """Subroutine CREEP of CalculiX."""
 
@@ -361,7 +367,7 @@ class CalculixCreepSubroutine(CreepSubroutine):
         )
         yield (
             "*CREEP, LAW=USER in the material without TYPE=ORTHO, by which ccx runs a law of its own, and *VISCO, "
-            "CETOL=... as the step, which insists on CETOL; 1e-2 and 1e-4 give the same run."
+            f"CETOL=... as the step, which insists on CETOL. {CALCULIX_CETOL}"
         )
         yield "It insists on *INITIAL CONDITIONS, TYPE=TEMPERATURE whether or not the law depends on temperature."
         if code.states:

@@ -35,9 +35,10 @@ from creepkit.exporters.creep_forms import (
     temperature_grid,
     temperature_span,
 )
+from creepkit.exporters.creep_subroutine import CALCULIX_CETOL
 from creepkit.exporters.law_code import Identifiers
 from creepkit.hookspecs import hookimpl
-from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.language.symbols import GAS_CONSTANT, mean_stress, principal_stress
 from creepkit.records import Exporter, LawWithValues
 
 _SMALLEST_COEFFICIENT = 1e-27
@@ -96,7 +97,7 @@ class AbaqusCards(CodeInput):
         elastic = ["*ELASTIC", *(_data_line(m.E, m.nu, m.T) for m in rows)] if rows else []
         cards = [f"*MATERIAL, NAME={names.unique(requested)}", *elastic, *creep]
         notes = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
-        notes += [_TABLE_OF_MODULI] if elastic and table else []
+        notes += [_TABLE_OF_MODULI] if table else []
         return [*names.renaming_notes([requested]), *creep_comments, *notes], cards
 
     def _creep_cards(self, source: LawWithValues, forms: Sequence[CreepForm]) -> CreepCards:
@@ -155,6 +156,7 @@ class CalculixCards(AbaqusCards):
     code, program = "CalculiX' *CREEP, LAW=NORTON", "CalculiX"
     has_steady_arrhenius = False
     alternative = "export it as 'calculix', a CREEP subroutine"
+    unknown_there = (principal_stress, mean_stress)
     name: str = "calculix-cards"
     title: str = "CalculiX material cards with its own creep law (*CREEP, LAW=NORTON)"
 
@@ -171,8 +173,7 @@ class CalculixCards(AbaqusCards):
             raise self.refusal(source, f": A would be as small as {found} ({remedy})")
         data = [_data_line(exp_in_range(ln, "A", source), form.n, form.time_exponent, T) for T, ln in rows.items()]
         formula = "rate = A q^n t^m, of equivalent stress q and total time t, which must start with the load. A, n, m."
-        steps = "CETOL of 1e-2 and 1e-4 give the same increments: state small ones where the rate falls with time."
-        return [f"LAW=NORTON: {formula}", *notes, steps], ["*CREEP, LAW=NORTON", *data]
+        return [f"LAW=NORTON: {formula}", *notes, CALCULIX_CETOL], ["*CREEP, LAW=NORTON", *data]
 
 
 def _power_law(

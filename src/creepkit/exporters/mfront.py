@@ -30,7 +30,16 @@ from creepkit.exporters.creep_forms import elastic_expressions
 from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
 from creepkit.exporters.law_description import comment_lines, comment_safe, heading, printable_text
 from creepkit.hookspecs import hookimpl
-from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.language.symbols import (
+    POINT_VARIABLES,
+    State,
+    mean_stress,
+    principal_stress,
+    strain,
+    stress,
+    temperature,
+    time,
+)
 from creepkit.records import Exporter, LawWithValues
 
 _MFRONT_RESERVED = """
@@ -238,6 +247,28 @@ _PREDICTOR_BLOCK = [
 ]
 
 
+_CONVERGENCE_BLOCK = [
+    "@AdditionalConvergenceChecks {",
+    "  // residuals of long increments round at more than epsilon: it ends where corrections change nothing, too",
+    "  const real size = norm(zeros);",
+    "  converged = converged || (iter > 1 && error < 1e-8 * size && norm(delta_zeros) < 1e-14 * size);",
+    "}",
+]
+
+
+def _increment_block(behaviour: IntegratorBlock) -> Iterator[str]:
+    """Increments that are given back: in which the material ruptures, or the midpoint rule overshoots."""
+    yield "@APosterioriTimeStepScalingFactor {"
+    for name, state in zip(behaviour.states, behaviour.law.states.values(), strict=True):
+        if state.limit is not None:
+            yield f"  if ({_is_broken(name, state)}) throw OutOfBoundsException({_rupture_text(name)});"
+    yield "  // the midpoint rule overshoots where creep takes more than a fifth of the stress"
+    yield "  const StrainStensor start = eel - deel;"
+    yield "  const bool relaxes = sigmaeq(eel) < 0.8 * sigmaeq(start) && 3 * dp > 0.4 * sigmaeq(start);"
+    yield "  if (theta < 1 && relaxes) return {false, real(1) / 2};"
+    yield "}"
+
+
 _FORMULA_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.Symbol, sympy.Number)
 """What the formulas of @ElasticMaterialProperties may hold."""
 
@@ -261,6 +292,8 @@ class MfrontExporter:
             list(_parameters(behaviour)),
             *([_PREDICTOR_BLOCK] if behaviour.law.uses(strain) else []),
             list(_integrator_block(behaviour)),
+            _CONVERGENCE_BLOCK,
+            list(_increment_block(behaviour)),
         ]
         if behaviour.law.uses(time):
             sections.append(["@UpdateAuxiliaryStateVariables {", f"  {behaviour.elapsed} += dt;", "}"])
@@ -275,9 +308,12 @@ def _header(behaviour: IntegratorBlock) -> Iterator[str]:
         "",
         f"Stress and Young's modulus are in {units.stress}, time in {units.time}, temperature in K.",
         "The creep strain p flows along the deviator of the stress; damage does not weaken the elasticity.",
-        "The midpoint rule (theta = 0.5) is of second order. Where the stress relaxes by more than a tenth in an",
-        "increment it overshoots, and converges all the same: bound increments so, or set theta = 1 (first order).",
+        "The midpoint rule (theta = 0.5) is of second order. It overshoots where the stress relaxes much, so that an "
+        "increment in which creep takes more than a fifth of it is given back, to be halved. A code that does not "
+        "halve increments needs short ones, or @Theta 1 (first order).",
         "Powers of strain stay finite at the start; if the rate falls steeply there, keep increments short.",
+        "Behaviours of one name in one folder of MFront replace each other: give each material a name of its own, "
+        "--name in a command, ck.law_with_values(..., name=...).",
     ]
     if behaviour.law.uses(time):
         header_lines.append(
@@ -350,16 +386,38 @@ def _parameters(behaviour: IntegratorBlock) -> Iterator[str]:
     for (symbol, value), param in zip(behaviour.code.parameters.items(), table, strict=True):
         unit = "" if param.unit == "1" else f"{param.unit}, "
         yield from comment_lines([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //", 0)
+        low, high = param.bounds
+        if low <= value <= high:
+            yield f"@Bounds {symbol} in [{low!r}:{high!r}];"
+    if covered := behaviour.source.ranges.get("temperature"):
+        yield f"@Bounds T in [{covered[0]!r}:{covered[1]!r}]; // of the tests"
+
+
+def _is_broken(value: str, state: State) -> str:
+    """The condition that a state, less its start, has not stayed within its limit; a NaN has not."""
+    span = float(state.limit or 0.0) - state.initial
+    return f"!({value} {'<' if span > 0 else '>'} {span!r})"
+
+
+def _rupture_text(name: str) -> str:
+    return f'"the material ruptures: {name} reaches its limit within this increment"'
 
 
 def _integrator_block(behaviour: IntegratorBlock) -> Iterator[str]:
     # the brick has set feel to deel - deto, the DSL every other residual to its increment
     state_residuals = [f"f{name} -= dt * {name}_rate;" for name in behaviour.states]
+    ends = [
+        f"if (iter + 1 == iterMax && {_is_broken(f'{name} + dt * {name}_rate', state)}) "
+        f"throw OutOfBoundsException({_rupture_text(name)});"
+        for name, state in zip(behaviour.states, behaviour.law.states.values(), strict=True)
+        if state.limit is not None
+    ]
     parts = {
         "stable functions": [cpp_lambda_definition(name) for name in stable_functions_in(behaviour.rate_lines())],
         "stress and its direction, at t + theta dt": behaviour.tensor_lines(),
         "the point, in MPa and s": behaviour.point_lines(),
         "the law": behaviour.rate_lines(),
+        "where the last iteration has no solution": ends,
         "the implicit system": ["feel += dp * flow;", "fp -= dt * rate;", *state_residuals],
         "its Jacobian": behaviour.jacobian_lines(),
     }

@@ -383,7 +383,7 @@ def loading_text(loading: Loading, unit: str = "MPa") -> str:
 def _levels_text(program: Program, factor: float = 1.0) -> str:
     held, values = _held_levels(program), program.values
     if 1 <= len(held) <= MOST_LEVELS and max(held) == values.max():
-        return " to ".join(f"{factor * level:.6g}" for level in held)
+        return " to ".join(f"{factor * level:.{6 if factor == 1.0 else 4}g}" for level in held)
     if values[0] <= RAMPED * values.max() > 0.0:  # a load that was recorded from its ramp on
         return f"{factor * (values[-1] if values[-1] > 0.5 * values.max() else values.max()):.4g}"
     return f"{factor * values[0]:.6g} to {factor * values[-1]:.6g}"

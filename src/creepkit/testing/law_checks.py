@@ -120,12 +120,13 @@ def check_temperature(law: CreepLaw, samples: LawSamples) -> str | None:
     """The rate grows with temperature at most points, or the law declares that it falls."""
     if not law.uses(temperature):
         return None
-    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    for one in set[sympy.Expr]().union(*(rate.atoms(sympy.Add) for rate in rates)):
-        factor = one.coeff(temperature)
-        shift = (one - factor * temperature) / (factor or 1)
-        is_celsius = shift.is_number and abs(shift - ZERO_CELSIUS) < 1.0
-        assert not is_celsius, f"temperature + {shift:.5g} stands in it, and temperature is in K already; leave it out"
+    parts = [*law.terms.values(), *(state.rate for state in law.states.values()), *law.constraints]
+    for one in set[sympy.Expr]().union(*(part.atoms(sympy.Add) for part in parts)):
+        shift = sympy.expand(one / (one.coeff(temperature) or 1) - temperature)
+        is_celsius = shift.is_number and abs(abs(shift) - ZERO_CELSIUS) < 1.0
+        assert not (is_celsius and (shift > 0 or any(part.has(1 / one) for part in parts))), (
+            f"temperature {shift:+.5g} stands in it, and temperature is in K already; leave it out"
+        )
     warmer = samples.scaled([POINT_VARIABLES.index(temperature)], 1.01)
     before, after = (log_rate(lower(law, "numpy"), one) for one in (samples, warmer))
     counted = np.isfinite(before) & np.isfinite(after) & constraints_hold(law, warmer.points, warmer.theta)
@@ -199,15 +200,16 @@ def check_unlimited_states(law: CreepLaw, _: LawSamples) -> str | None:
         return terms, rate if mpmath.im(rate) == 0 else 0.0
 
     for k, symbol in unlimited:
-        first, last = rates(k, _GROWTH[0])[1] or 0.0, 0.0
-        for grown in _GROWTH:
+        sign = -1.0 if (rates(k, 0.0)[1] or 0.0) < 0 else 1.0
+        first, last = rates(k, sign * _GROWTH[0])[1] or 0.0, 0.0
+        for grown in (sign * step for step in _GROWTH):
             terms, rate = rates(k, grown)
             before, end = rates(k, last + 0.999 * (grown - last))[1] if rate is None else rate, initial[k] + grown
-            if before is not None and not before > _STILL * first:
+            if before is not None and not sign * before > sign * _STILL * first:
                 break  # it does not come so far
             assert all(mpmath.im(one) == 0 and 0 <= one < mpmath.inf for one in terms), (
                 f"'{symbol}' has no limit, and a term is infinite or changes its sign before it is {end:.3g}; "
-                f"state where the material ends, ck.State(..., limit={end:.1g})"
+                f"state where the material ends, ck.State(..., limit={initial[k] + (last or grown):.1g})"
             )
             last = grown
     return f"{len(unlimited)} followed" if unlimited else None

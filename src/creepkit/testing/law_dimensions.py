@@ -14,6 +14,7 @@ import ast
 import operator
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
@@ -162,13 +163,22 @@ def check_dimensions(law: CreepLaw) -> None:
     rates = {f"term '{label}'": (term, NO_UNIT) for label, term in law.terms.items()}
     rates |= {f"rate of '{s}'": (z.rate, units[s] or NO_UNIT) for s, z in law.states.items()}
     for place, (rate, of) in rates.items():
-        with restated(DimensionError, DimensionError, f"{place}: {SAID}"):
+        with restated(DimensionError, DimensionError, f"{place}: {SAID}{_state_without_unit(law, rate, units)}"):
             unit = analysis.unit(rate)
         if unit is not None and not _is_rate(unit * of.power(Fraction(-1))):
             raise DimensionError(
                 f"{place} comes out in {_text(unit)}, and must in {'' if of is NO_UNIT else f'{of} per s, '}1/s or "
                 'without a unit; correct unit= of its parameters, "1/s" for a rate coefficient'
             )
+
+
+def _state_without_unit(law: CreepLaw, rate: sympy.Expr, units: Mapping[sympy.Symbol, Unit]) -> str:
+    """The remedy where a rate goes together as soon as a state that was given no unit has one."""
+    for symbol in (s for s, state in law.states.items() if state.unit == "1"):
+        with suppress(DimensionError):
+            _Analysis({**units, symbol: None}).unit(rate)
+            return f"; or give the state '{symbol}' its unit, ck.State(..., unit=...)"
+    return ""
 
 
 class _Analysis:

@@ -7,7 +7,7 @@ accepted when its error is no more than the last bits of the inputs make.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +19,7 @@ from creepkit.kernels.interface import POINT_SIZE, call_entry
 from creepkit.kernels.lowering import ArrayKernel, lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.testing.sample_points import LawSamples
+from creepkit.testing.sample_points import LawSamples, point_text
 
 
 @dataclass(frozen=True)
@@ -65,18 +64,12 @@ def _kernel_table(kernel: ArrayKernel, arguments: Sequence[Any]) -> KernelTable:
     result = kernel.internal_derivatives(*arguments)
     values = [result.rate, *kernel.internal_rates(*arguments)[1:]]
     derivatives = [{**result.point, **result.params}, *result.state_rates.values()]
-    rows = [
-        [value, *derivatives_of_row.values()] for value, derivatives_of_row in zip(values, derivatives, strict=True)
-    ]
+    rows = [[value, *of_value.values()] for value, of_value in zip(values, derivatives, strict=True)]
     columns = np.array([[np.asarray(column, float) for column in row] for row in rows])
     return KernelTable(np.moveaxis(columns, -1, 0), np.asarray(kernel.internal_log_rate(*arguments), float))
 
 
-KERNEL_EVALUATORS: dict[str, Callable[[CreepLaw, LawSamples], KernelTable]] = {
-    "numpy": evaluate_numpy,
-    "torch": evaluate_torch,
-    "compiled": evaluate_compiled,
-}
+KERNEL_EVALUATORS = {"numpy": evaluate_numpy, "torch": evaluate_torch, "compiled": evaluate_compiled}
 """{target: function that evaluates it}."""
 
 
@@ -100,7 +93,7 @@ _ROUNDING_FACTOR = 4.0
 """How many times the change from the last bit of every input an error may be where a result cancels."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class RelativeDifference:
     """The largest relative difference of one kind, and where it is: sample, row (rate or state), column."""
 
@@ -146,12 +139,9 @@ class MultiprecisionReference:
 
         A derivative that is a small difference, far below that size, changes nothing that is computed with it.
         """
-        position = column - 1
-        inputs = [*self.samples.points[sample], *self.samples.theta[sample]]
-        parameters = list(self.exact.law.params.values())
-        first_parameter = len(inputs) - len(parameters)
-        is_log = position >= first_parameter and parameters[position - first_parameter].scale == "log"
-        size = 1.0 if is_log else abs(float(inputs[position]))
+        position, point = column - 1, self.samples.points[sample]
+        is_log = position >= point.size and self.exact.law.log_scale[position - point.size]
+        size = 1.0 if is_log else abs(float([*point, *self.samples.theta[sample]][position]))
         return abs(self.rows[sample][row][0]) / size if size > 0.0 else mpmath.mpf(0)
 
     def location_text(self, difference: RelativeDifference) -> str:
@@ -159,9 +149,7 @@ class MultiprecisionReference:
         exact, names = self.exact, [s.name for s in self.exact.variables]
         what = ["rate", *(f"rate of {s}" for s in exact.law.states)][difference.row]
         of = what if difference.column == 0 else f"d({what})/d({names[difference.column - 1]})"
-        point = self.samples.points[difference.sample]
-        used = [k for k, s in enumerate((*POINT_VARIABLES, *exact.law.states)) if exact.law.uses(s)]
-        return f"{of} at {', '.join(f'{names[k]} {point[k]:.4g}' for k in used)}"
+        return f"{of} at {point_text(exact.law, self.samples.points[difference.sample])}"
 
 
 def largest_differences(
@@ -171,21 +159,15 @@ def largest_differences(
 
     allow_cancellation : leave out results that cancel, whose error is no more than the last bits of the inputs make.
     """
-    values = derivatives = RelativeDifference()
+    worst = [RelativeDifference(), RelativeDifference()]
     for k, (rows, computed, log) in enumerate(zip(reference.rows, table.rows, table.log_rates, strict=True)):
-        values = max(values, RelativeDifference(_log_difference(rows[0][0], log), k), key=_size)
+        worst[0] = max(worst[0], RelativeDifference(_log_difference(rows[0][0], log), k))
         for difference in _differences(k, rows, computed):
-            limit = VALUE_TOLERANCE if difference.column == 0 else DERIVATIVE_TOLERANCE
-            checked = (
-                difference
-                if difference.size <= limit
-                else _recheck_difference(reference, table, difference, allow_cancellation)
-            )
-            if checked.column == 0:
-                values = max(values, checked, key=_size)
-            else:
-                derivatives = max(derivatives, checked, key=_size)
-    return values, derivatives
+            checked, kind = difference, int(difference.column > 0)
+            if difference.size > (VALUE_TOLERANCE, DERIVATIVE_TOLERANCE)[kind]:
+                checked = _recheck_difference(reference, table, difference, allow_cancellation)
+            worst[kind] = max(worst[kind], checked)
+    return worst[0], worst[1]
 
 
 def _recheck_difference(
@@ -228,7 +210,3 @@ def _relative_difference(exact: Any, computed: float) -> float:
     if exact == 0:
         return 0.0 if abs(computed) < NEGLIGIBLE_RATE else np.inf
     return float(abs(mpmath.mpf(computed) / exact - 1))
-
-
-def _size(difference: RelativeDifference) -> float:
-    return difference.size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -24,6 +25,7 @@ from creepkit.records import (
     loads_of,
     typical_history,
 )
+from creepkit.records.loading import held_otherwise
 from creepkit.registry import default_registry
 from creepkit.testing.predictor_checks import (
     SAME,
@@ -116,7 +118,13 @@ def check_load(case: PredictorCase, load: Load) -> str:
         f"a typical test ends early, {status.text}{f': {found.reason}' if found.reason else ''}; state the range of "
         f"this load, conditions = {{'{load.name}': (low, high)}}"
     )
-    return f"{load.quantity} in {load.unit or 'no unit'}"
+    told = f"{load.quantity} in {load.unit or 'no unit'}"
+    if (other := held_otherwise(plan.loading)) is not None:
+        with suppress(CreepkitError):
+            swapped = prediction_or_refusal(lambda: case.predict(histories=[plan.replace(loading=other[0])]))
+            if largest_difference(found.of(0), swapped.of(0)) <= FOLLOWED:
+                told += "; a held load counts as a held true stress here, which under a load grows as exp(strain)"
+    return told
 
 
 @finding("steps of load {}", each=lambda case: loads_of(case.predictor))

@@ -4,12 +4,19 @@ import ctypes
 import re
 import subprocess
 
+import mpmath
 import numpy as np
 import pytest
 
 from creepkit.errors import ExportError
 from creepkit.exporters import creep_subroutine
-from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine, law_subroutine
+from creepkit.exporters.creep_subroutine import (
+    AbaqusCreepSubroutine,
+    CalculixCreepSubroutine,
+    fortran_statements,
+    law_subroutine,
+    stable_function_definitions,
+)
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
@@ -61,8 +68,6 @@ def rows_of(library, name, point, judged):
 
 
 def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfortran):
-    import mpmath
-
     lines = [
         "subroutine probe(a, out)",
         "implicit none",
@@ -70,8 +75,6 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfor
         "double precision, intent(out) :: out(6)",
         *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
     ]
-    from creepkit.exporters.creep_subroutine import fortran_statements, stable_function_definitions
-
     text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
     library = compile_fortran(gfortran, "\n".join(text) + "\n", tmp_path, "probe")[0]
     for a in (1e-12, 3e-5, 0.02, 0.4, 0.6, 0.9, 1.1, 5.0, 40.0, 600.0):
@@ -82,20 +85,14 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfor
         assert out == pytest.approx([float(e) for e in exact], rel=1e-14)
 
 
-def _probed():
-    import mpmath as mp
-
-    return {
-        "log1p": lambda x: mp.log(1 + x),
-        "expm1": lambda x: mp.exp(x) - 1,
-        "log_sinh": lambda x: mp.log(mp.sinh(x)),
-        "log_cosh": lambda x: mp.log(mp.cosh(x)),
-        "log_rise": lambda x: mp.log(1 - mp.exp(-x)),
-        "coth": lambda x: mp.coth(x),
-    }
-
-
-PROBED = _probed()
+PROBED = {
+    "log1p": lambda x: mpmath.log(1 + x),
+    "expm1": lambda x: mpmath.exp(x) - 1,
+    "log_sinh": lambda x: mpmath.log(mpmath.sinh(x)),
+    "log_cosh": lambda x: mpmath.log(mpmath.cosh(x)),
+    "log_rise": lambda x: mpmath.log(1 - mpmath.exp(-x)),
+    "coth": mpmath.coth,
+}
 
 
 # ---- the text ------------------------------------------------------------------------------------------------------

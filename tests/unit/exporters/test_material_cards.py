@@ -17,7 +17,17 @@ from creepkit.exporters.material_cards import AbaqusCards, AnsysCards, CalculixC
 from creepkit.exporters.moose_neml2 import MooseBlock, Neml2Model
 from creepkit.kernels import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
-from creepkit.language import GAS_CONSTANT, Elastic, arrhenius, linear, wachtman
+from creepkit.language import (
+    GAS_CONSTANT,
+    CreepLaw,
+    Elastic,
+    arrhenius,
+    linear,
+    mean_stress,
+    parameters,
+    stress,
+    wachtman,
+)
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -30,6 +40,7 @@ from helpers.paths import GOLDEN
 from helpers.registered_laws import registered_laws
 
 EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}
+EVERY = {**EXPORTERS, "calculix-cards": CalculixCards()}
 EXACT = cache(MultiprecisionLaw)
 UNITS = [Units(), Units("Pa", "h"), Units("psi", "min")]
 TABLES = {
@@ -251,50 +262,36 @@ def test_moduli_that_depend_on_temperature_are_refused_where_numbers_are_needed(
         EXPORTERS[name].text(CASES["norton"].replace(elastic=STEEL_WITH_TEMPERATURE))
 
 
-AT = dict(A=1e-9, n=4)
+AT, SPL, TPL = dict(A=1e-9, n=4), STRAIN_HARDENING, TIME_HARDENING
+A, n = parameters("A n")
+MEAN = LawWithValues(CreepLaw("mean", {"creep": A * (stress + mean_stress) ** n}, NORTON.params), AT)
+ALL, BENT = valued(COMBINED, **COMBINED.center()), valued(NORTON.with_temperature(n=linear()), n_T=-1e-3, **AT)
 REFUSED = [
-    (
-        "abaqus-cards",
-        valued(STRAIN_HARDENING, A=1e-9, n=0, m=-0.5),
-        r"asks for n > 0 .* \(n = 0, m = -0.333333\); export",
-    ),
+    ("abaqus-cards", valued(SPL, A=1e-9, n=0, m=-0.5), r"asks for n > 0 .* \(n = 0, m = -0.333333\); export"),
     ("abaqus-cards", valued(EXPONENTIAL, A=1e-9, B=20), "its exponential of stress does not stand alone there"),
-    (
-        "abaqus-cards",
-        valued(COMBINED, **COMBINED.center()),
-        r"a sum of 3 \(hyperbolic sine \+ strain hardening \+ time",
-    ),
-    ("ansys", valued(COMBINED, **COMBINED.center()), "none of Ansys' implicit creep laws.*USERCREEP"),
-    (
-        "ansys",
-        valued(NORTON.with_temperature(n=linear()), n_T=-1e-3, **AT),
-        "not a number .constants at one temperature may",
-    ),
+    ("abaqus-cards", ALL, r"a sum of 3 \(hyperbolic sine \+ strain hardening \+ time"),
+    ("ansys", ALL, "none of Ansys' implicit creep laws.*USERCREEP"),
+    ("ansys", BENT, "not a number .constants at one temperature may"),
     ("ansys", valued(NORTON.times(arrhenius(300.0)), Q=2.7e6, **AT), "C1 would be 1e461, .* give the temperature"),
-    ("moose", valued(STRAIN_HARDENING, m=-0.5, **AT), r"power -0.5 of creep strain \(its m_exponent is one of time\)"),
+    ("moose", valued(SPL, m=-0.5, **AT), r"power -0.5 of creep strain \(its m_exponent is one of time\)"),
     ("moose", valued(HYPERBOLIC_SINE, B=40, **AT), "no creep model for its sinh of stress"),
-    (
-        "code_aster",
-        valued(TIME_HARDENING, m=-0.5, **AT),
-        "is not code_aster's LEMAITRE: time hardening depends on time",
-    ),
+    ("code_aster", valued(TPL, m=-0.5, **AT), "is not code_aster's LEMAITRE: time hardening depends on time"),
     ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
-    ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
+    ("neml2", valued(TPL, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
     ("neml2", valued(NORTON, **AT), r"needs the moduli; give export\(..., elastic=ck.Elastic"),
+    ("calculix-cards", MEAN, "mean.*; export it as 'mfront', which has the principal and the mean stress"),
 ]
 
 
 @pytest.mark.parametrize(("name", "source", "message"), REFUSED)
 def test_refusals_give_the_reason(name, source, message):
     with pytest.raises(ExportError, match=message) as error:
-        EXPORTERS[name].text(source)
+        EVERY[name].text(source)
     assert "\n" not in str(error.value)
 
 
 def test_moduli_are_an_argument():
-    assert ck.export(NORTON, "neml2", {"A": 1e-9, "n": 4.0}, elastic=STEEL) == Neml2Model().text(
-        LawWithValues(NORTON, {"A": 1e-9, "n": 4.0}, elastic=STEEL)
-    )
+    assert ck.export(NORTON, "neml2", AT, elastic=STEEL) == Neml2Model().text(LawWithValues(NORTON, AT, elastic=STEEL))
 
 
 def test_a_temperature_makes_a_card_possible():
@@ -304,9 +301,10 @@ def test_a_temperature_makes_a_card_possible():
     assert rate(50.0, 0.0, 0.0, 1.0) == pytest.approx(float(true_rate(source, 50.0, 0.0, 0.0, 310.0)), rel=1e-10)
 
 
-@pytest.mark.parametrize(
-    "title", ["-*- coding: unicode_escape -*- \\x0aharmed = 1 #", "coding: utf-7 +AAo-harmed = 1+AAo-#"]
-)
+CODINGS = ["-*- coding: unicode_escape -*- \\x0aharmed = 1 #", "coding: utf-7 +AAo-harmed = 1+AAo-#"]
+
+
+@pytest.mark.parametrize("title", CODINGS)
 def test_no_title_sets_the_encoding_of_a_file_for_code_aster(title):
     """Such a file is Python, whose first two lines may name an encoding (PEP 263) in which a comment has more lines."""
     law = NORTON.rename("norton", title)
@@ -317,15 +315,9 @@ def test_no_title_sets_the_encoding_of_a_file_for_code_aster(title):
     assert {*names} - {*commands} == {"norton", "__builtins__"}
 
 
-ELSEWHERE = {
-    **dict.fromkeys(
-        ("c", "javascript", "abaqus", "calculix", "mfront", "python", "numpy"), "compiled or run, 50 digits"
-    ),
-    **dict.fromkeys(("latex", "markdown", "mathml"), "equations and tables for people"),
-    "json": "read back",
-    "calculix-cards": "read beside those of Abaqus, in a test of its own",
-}
-"""{target: how the test of its own judges it over all laws}; the others are cards, which are read here."""
+PROGRAMS = {"c", "javascript", "abaqus", "calculix", "mfront", "python", "numpy"}
+ELSEWHERE = PROGRAMS | {"latex", "markdown", "mathml", "json", "calculix-cards"}
+"""Targets judged over all laws by tests of their own; the others are cards, which are read here."""
 
 
 def test_every_registered_law_gives_a_card_with_its_rate_or_a_reason():

@@ -20,7 +20,7 @@ from creepkit.exporters.python import NumpyExporter, PythonExporter
 from creepkit.exporters.unit_conversion import coefficient_unit, convert_values, degree
 from creepkit.kernels import lower
 from creepkit.kernels.multiprecision import MultiprecisionLaw
-from creepkit.language import CreepLaw, Param, State, parameters, states, stress
+from creepkit.language import CreepLaw, Param, State, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -251,10 +251,6 @@ def test_converted_values_give_the_same_rates():
 # ---- python ----------------------------------------------------------------------------------------------------------
 
 # The exported Python modules, of numbers and of arrays, run alone and agree with the law in 50 digits.
-
-
-A, n, C = parameters("A n C")
-(omega,) = states("omega")
 
 
 def module(law, folder, values=None, notes=(), exporter=None, **more):

@@ -47,6 +47,19 @@ GOOD = law("A * stress**n", PLAIN)
 ACTIVATED = "A: RATE, n: POWER, Q: ENERGY"
 
 
+def power(params: str = PLAIN, **more: str) -> str:
+    """A power law."""
+    return law("A*stress**n", params, **more)
+
+
+def hot(over: str, params: str = ACTIVATED, **more: str) -> str:
+    """A power law with exp(-Q over something)."""
+    return law(f"A*stress**n*sympy.exp(-Q/{over})", params, **more)
+
+
+OXIDE = PLAIN + ", B: RATE, s_0: Param('s', (1, 2), 'mm')"
+
+
 def damage(state: str, term: str = "A * stress**n / (1 - w)", params: str = PLAIN + ", B: RATE") -> str:
     """A law with one internal variable w."""
     return law(term, params, more=f"states={{w: {state}}}")
@@ -55,34 +68,29 @@ def damage(state: str, term: str = "A * stress**n / (1 - w)", params: str = PLAI
 LAWS: dict[str, tuple[str, str]] = {
     # ---- units
     "rate coefficient in 1/h": (
-        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), '1/h', 'log'), n: POWER"),
+        power("A: Param('a', (1e-9, 1e-5), '1/h', 'log'), n: POWER"),
         "comes out in 0.000277778 s^-1",
     ),
     "energy in kJ, constant in J": (
-        law(
-            "A*stress**n*sympy.exp(-Q/(R*temperature))", ACTIVATED.replace("ENERGY", "Param('q', (100, 500), 'kJ/mol')")
-        ),
+        hot("(R*temperature)", ACTIVATED.replace("ENERGY", "Param('q', (100, 500), 'kJ/mol')")),
         "divides an energy in 1000 J by a constant in J; give the energy in J/mol, or multiply by 1000",
     ),
-    "no gas constant": (law("A*stress**n*sympy.exp(-Q/temperature)", ACTIVATED), "divide by the gas constant"),
+    "no gas constant": (hot("temperature"), "divide by the gas constant"),
     "exponential of a stress in MPa": (
         law("A*stress**n*sympy.exp(strain*B)", PLAIN + ", B: Param('b', (1, 9), 'MPa')"),
         "the argument of exp, B*strain, is in MPa",
     ),
     "power of a temperature": (law("A*stress**n*temperature**m", PLAIN + ", m: POWER"), "divide it by a reference"),
-    "exponent with a unit": (law("A*stress**n", "A: RATE, n: Param('n', (1, 8), 'K')"), "the exponent, n, is in K"),
+    "exponent with a unit": (power("A: RATE, n: Param('n', (1, 8), 'K')"), "the exponent, n, is in K"),
     "slope of temperature without its unit": (
         law("A*stress**n*(1 + B*temperature)", PLAIN + ", B: Param('b', (1e-4, 1e-3))"),
         "beside B*temperature in K",
     ),
     "unit of no known spelling": (
-        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), 'per second', 'log'), n: POWER"),
+        power("A: Param('a', (1e-9, 1e-5), 'per second', 'log'), n: POWER"),
         "the unit of A is not understood, 'per' in 'per second'",
     ),
-    "log scale without a unit": (
-        law("A*stress**n", "A: Param('a', (1e-9, 1e-5), scale='log'), n: POWER"),
-        "missing unit",
-    ),
+    "log scale without a unit": (power("A: Param('a', (1e-9, 1e-5), scale='log'), n: POWER"), "missing unit"),
     # ---- rates
     "negative by its sign": (
         law("-B*stress**m", "B: RATE, m: POWER"),
@@ -109,10 +117,16 @@ LAWS: dict[str, tuple[str, str]] = {
         damage("State(0.0, B*stress**n, 'softening')", "A*stress**n*(1 - w)"),
         "state where the material ends, ck.State(..., limit=1)",
     ),
-    "temperature in C": (
-        law("A*stress**n*sympy.exp(-Q/(R*(temperature + 273.15)))", ACTIVATED),
-        "temperature is in K already; leave it out",
+    "ductility without a limit": (
+        damage("State(1.0, -B*stress**n, 'ductility')", "A*stress**n*w"),
+        "before it is -0.259; state where the material ends",
     ),
+    "temperature in C in a denominator": (hot("(R*(temperature - 273.15))"), "temperature -273.15 stands in it"),
+    "state without its unit": (
+        damage("State(0.0, B*stress, 'oxide', limit=9)", "A*stress**n*sympy.exp(w/s_0)", OXIDE),
+        "or give the state 'w' its unit",
+    ),
+    "temperature in C": (hot("(R*(temperature + 273.15))"), "temperature is in K already; leave it out"),
     "falls with temperature": (
         law("A*stress**n*sympy.exp(Q/(R*temperature))", ACTIVATED),
         "check the sign of the activation energy",
@@ -121,17 +135,14 @@ LAWS: dict[str, tuple[str, str]] = {
     "complex number": (law("A*stress**n*sympy.I", PLAIN), "is not finite and real"),
     # ---- symbols, tables and texts
     "function for a term": (law("lambda s: s", PLAIN), "is not a sympy expression"),
-    "name with spaces": (law("A*stress**n", PLAIN, name="'my law'"), "joined by hyphens"),
+    "name with spaces": (power(name="'my law'"), "joined by hyphens"),
     "name that is taken": (law("2*A*stress**n", PLAIN, name="'norton'"), "'norton' is taken, by plugin 'norton'"),
-    "no name": (law("A*stress**n", PLAIN, name="''"), "a law needs a name in words"),
-    "no references": (law("A*stress**n", PLAIN, refs="()"), "missing references"),
-    "letters of a reference": (law("A*stress**n", PLAIN, refs="tuple('Norton')"), "write a tuple of texts"),
-    "missing bounds": (law("A*stress**n", "A: RATE, n: Param('exponent')"), "bounds"),
-    "number for a Param": (law("A*stress**n", "A: RATE, n: 5.0"), "allowed is a Param"),
-    "constraints that never hold": (
-        law("A*stress**n", PLAIN, more="constraints=(n > 9,)"),
-        "the constraints hold at 0",
-    ),
+    "no name": (power(name="''"), "a law needs a name in words"),
+    "no references": (power(refs="()"), "missing references"),
+    "letters of a reference": (power(refs="tuple('Norton')"), "write a tuple of texts"),
+    "missing bounds": (power("A: RATE, n: Param('exponent')"), "bounds"),
+    "number for a Param": (power("A: RATE, n: 5.0"), "allowed is a Param"),
+    "constraints that never hold": (power(more="constraints=(n > 9,)"), "the constraints hold at 0"),
     "off that is no switch": (
         law("A*sympy.sinh(stress/B)", "A: RATE, B: Param('b', (1, 100), 'MPa', 'log', off=0.0)"),
         "off equals fix: law",
@@ -143,19 +154,15 @@ LAWS: dict[str, tuple[str, str]] = {
     ),
     "damage that heals": (damage("State(0.0, -B*stress, 'damage', limit=0.99)"), "correct the sign of its rate"),
     "rate of a state in another unit": (
-        damage(
-            "State(0.0, B*stress, 'oxide', unit='mm', limit=0.99)",
-            "A*stress**n*sympy.exp(w/s_0)",
-            PLAIN + ", B: RATE, s_0: Param('s', (1, 2), 'mm')",
-        ),
+        damage("State(0.0, B*stress, 'oxide', unit='mm', limit=0.99)", "A*stress**n*sympy.exp(w/s_0)", OXIDE),
         "rate of 'w' comes out in s^-1, and must in mm per s",
     ),
     # ---- examples
     "example with another rate": (
-        law("A*stress**n", PLAIN, more="examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 2e-8},)"),
+        power(more="examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 2e-8},)"),
         "1e-08 1/s, and the example states 2e-08",
     ),
-    "example without a rate": (law("A*stress**n", PLAIN, more="examples=({'A': 1e-16},)"), "write a tuple of examples"),
+    "example without a rate": (power(more="examples=({'A': 1e-16},)"), "write a tuple of examples"),
 }
 HOOKS: dict[str, tuple[str, str, bool]] = {
     "a generator": (GOOD.replace("return [LAW]", "yield LAW"), "return list(...) of it", True),
@@ -208,7 +215,7 @@ def test_what_is_no_fault_passes(tmp_path: Path) -> None:
     """1e-16 * 100^4 = 1e-8."""
     anomaly = law("A*stress**n*sympy.exp(Q/(R*temperature))", ACTIVATED, more="falls_with_temperature=True")
     example = "examples=({'A': 1e-16, 'n': 4, 'stress': 100, 'rate': 1e-8},)"
-    counted = law("A*stress**n", PLAIN, more=example)
+    counted = power(more=example)
     for number, source in enumerate((GOOD, anomaly, counted)):
         assert told(source, tmp_path / f"good_{number}.py") == ""
     (report,) = check_plugin(Registry().load_file(tmp_path / "good_2.py"))

@@ -412,8 +412,13 @@ def failed(report: ConformanceReport) -> dict[str, str]:
 def test_what_follows_and_what_refuses_conforms(kind: type[SteadyBar]) -> None:
     report = ck.check_specimen(kind())
     assert report.passed, str(report)
+    said = [one.detail for one in (*report.checks, *ck.check_specimen(ck.specimen("uniaxial")).checks)]
+    assert [one for one in said if "a held load counts as" in one] == [
+        said[[c.name for c in report.checks].index(LOAD)]
+    ]
 
 
+LOAD = "load stress"
 ONE_LEVEL = "simulated as one of {} MPa held"
 STEPS = (
     (OfEveryLaw, ONE_LEVEL.format(100)),

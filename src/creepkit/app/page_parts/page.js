@@ -130,7 +130,7 @@
       charts.get("strain")?.heading.append(element("span", { class: "help" }, ` ${strainKind()}`));
       const point = data.laws[state.law].rate_point;
       rates = page.chart({ title: "Creep rate against stress", whole: true, x: { label: "stress, MPa", logarithmic: true }, y: { label: "creep rate, %/h", short: "%/h", logarithmic: true } });
-      rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}${data.tests.some((test) => test.minimum_rate !== null) ? "; points: measured minimum rates, each at the temperature of its test" : ""}`));
+      rates.heading.append(element("span", { class: "help" }, ` at strain ${page.format(point.strain, 2)}, ${page.duration(point.time)}${data.tests.some((test) => test.minimum_rate !== null) ? "; points: measured minimum rates, grey lines: the law at their temperatures" : ""}`));
       section = page.section();
       section.panel.hidden = true;
       panels.replaceChildren(element("span", { class: "chooser" }, chosen), ...[...charts.values()].map((chart) => chart.panel), section.panel, rates.panel);
@@ -169,7 +169,7 @@
       }
       warning.textContent = shown.length ? page.temperatureWarning(data, state) : "";
       warning.hidden = warning.textContent === "";
-      drawRates(answer.rate);
+      drawRates(answer.rate, answer.other_rates ?? []);
       if (answer.program?.section) {
         if (section.panel.hidden) {
           section.panel.hidden = false;
@@ -190,11 +190,11 @@
       }
     }
 
-    function drawRates(rate) {
+    function drawRates(rate, others) {
       if (!rate) return;
       const colour = page.colour(null);
       const drawn = (rate, style, colour) => ({ kind: "line", style, x: rate.stress, y: rate.log_rate.map((v) => (v === null ? null : PERCENT_PER_HOUR * 10 ** v)), colour });
-      const series = [...(before?.rate ? [drawn(before.rate, "before", "var(--soft)")] : []), drawn(rate, "plan", colour)];
+      const series = [...(before?.rate ? [drawn(before.rate, "before", "var(--soft)")] : []), ...others.map((one) => drawn(one, "", "var(--soft)")), drawn(rate, "plan", colour)];
       data.tests.forEach((test, k) => {
         if (state.tests[k] && test.minimum_rate !== null && test.load === "stress") series.push({ kind: "points", name: k, large: true, x: [test.program[1].at(-1)], y: [PERCENT_PER_HOUR * test.minimum_rate], colour: page.colour(k) });
       });

@@ -1,7 +1,7 @@
 "use strict";
 // Predictions by the runtime: of the planned test, of measured tests, of rates over stress.
 (function (page) {
-  const FRAMES = 120, RATE_STRESSES = 60, SECTION_TIMES = 8;
+  const FRAMES = 120, RATE_STRESSES = 60, SECTION_TIMES = 8, ONE_TEMPERATURE = 2;
   const plain = (values) => Array.from(values, (v) => (Number.isFinite(v) ? v : null));
   
   page.predicts = ({ runtime, model }) => runtime !== "dimple" || model !== null;
@@ -66,11 +66,18 @@
     const { values, exact } = question, { code, rate_point: point } = data.laws[question.law], [low, high] = point.stress;
     const law = globalThis.creepkitLaws[code];
     const stresses = Array.from({ length: RATE_STRESSES }, (_, k) => low * (high / low) ** (k / (RATE_STRESSES - 1)));
-    const { rate } = creepkit.rateCurve(law, values, { ...point, stresses, temperature: question.rate_temperature });
+    const rateAt = (temperature) => {
+      const { rate } = creepkit.rateCurve(law, values, { ...point, stresses, temperature });
+      return { stress: stresses, log_rate: Array.from(rate, (v) => (v > 0 && Number.isFinite(v) ? Math.log10(v) : null)) };
+    };
+    // measured rates are compared with those of the law at the temperatures of their tests
+    const measured = question.tests.map((k) => data.tests[k]).filter((test) => test.minimum_rate !== null);
+    const kelvin = new Set(measured.map((test) => Math.round(test.temperature_program[1][0])));
     return {
       tests: question.tests.map((k) => ofTest(law, values, data, k, exact)),
       program: question.program === null ? undefined : ofProgram(law, values, data, question),
-      rate: { stress: stresses, log_rate: Array.from(rate, (v) => (v > 0 && Number.isFinite(v) ? Math.log10(v) : null)) },
+      rate: rateAt(question.rate_temperature),
+      other_rates: [...kelvin].filter((T) => Math.abs(T - question.rate_temperature) > ONE_TEMPERATURE).map(rateAt),
     };
   };
 })((globalThis.creepkitPage ??= {}));

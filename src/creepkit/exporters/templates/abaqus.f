@@ -10,8 +10,10 @@
       double precision y($ny), slope($ny, 2), temps($nt), finish, start
       double precision initial($ny)
 !
-!     What may be edited: the total time TIME(2) at which the load was
-!     first applied ($time), and what turns TEMP into kelvin.
+!     What may be edited: the clock, TIME(2) of all steps or TIME(3) of
+!     those with creep; the time on it at which the load was first
+!     applied ($time); and what turns TEMP into kelvin.
+      integer, parameter :: clock = 2
       double precision, parameter :: t_first = 0.0d0
       double precision, parameter :: to_kelvin = 0.0d0
 !
@@ -22,7 +24,7 @@
 $initial
       decra = 0.0d0
       deswa = 0.0d0
-      finish = (time(2) - t_first)*seconds
+      finish = (time(clock) - t_first)*seconds
       start = finish - dtime*seconds
       temps(1) = temp - dtemp + to_kelvin
       temps(2) = temp + to_kelvin
