@@ -59,13 +59,13 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
         *("probentemperatur", "ofen", "ofentemperatur", "temperatur ofen", "température", "température d'essai"),
-        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai", "prüftemp", "versuchstemp", "probentemp"),
+        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai", "prüftemp", "versuchstemp", "probentemp", "nt11"),
     ),
     "stress": (
         *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
         *("remaining stress", "residual stress", "relaxed stress", "restspannung", "spannung", "prüfspannung"),
         *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale", "contrainte appliquée", "応力"),
-        *("contrainte nominale", "tensile stress", "axial stress"),
+        *("contrainte nominale", "tensile stress", "axial stress", "s mises", "mises stress", "von mises stress"),
     ),
     "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
     "strain": (
@@ -181,7 +181,7 @@ STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
     **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
     **dict.fromkeys(("ε tot", "eps tot", "ε total", "dehnung gesamt"), ("includes_elastic", "yes")),
     **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
-    **dict.fromkeys(("plastische dehnung", "bleibende dehnung"), ("includes_elastic", "no")),
+    **dict.fromkeys(("plastische dehnung", "bleibende dehnung", "ceeq"), ("includes_elastic", "no")),
 }
 """{name of a column of strains in small letters: key and text of the condition that it states}."""
 

@@ -85,7 +85,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
             "stress", 9.80665, "kgf/mm²", "kgf/mm^2", "kp/mm2", "kp/mm²", "kp/mm^2", "kg/mm2", "kg/mm²", "kg/mm^2"
         ),
         "ksi": _unit("stress", 1e3 * PSI),
-        "tsi": _unit("stress", 2240.0 * PSI, "tonf/in2", "ton/in2", "tons/in2", "tons/sq in"),
+        "tsi": _unit("stress", 2240.0 * PSI, "tonf/in2", "ton/in2", "tons/in2", "tons/sq in", "tons/sq.in."),
         "Msi": _unit("stress", 1e6 * PSI),
         "K": _unit("temperature", 1.0, "kelvin", "degk"),
         "C": _unit(

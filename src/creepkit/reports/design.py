@@ -54,7 +54,7 @@ def design_sentence(design: Design) -> str:
 def _is_hopeless(design: Design) -> bool:
     """Whether no test is likely to decide between the laws."""
     expected = [test.expectation for test in design.tests] + [one for one in [design.expected] if one is not None]
-    return design.goal == "law" and max((e.probability for e in expected), default=1.0) < USEFUL_PROBABILITY
+    return design.goal == "law" and bool(max((e.probability for e in expected), default=1.0) < USEFUL_PROBABILITY)
 
 
 def _refusals(design: Design) -> Counter[str]:

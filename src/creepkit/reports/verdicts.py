@@ -77,7 +77,7 @@ def noises_text(noises: float) -> str:
 
 def odds_text(log_odds: float) -> str:
     """Odds as a factor: "30 times"; log_odds : their ln."""
-    more = " or more" * (log_odds > LARGEST_SHOWN_ODDS)
+    more = " or more" if log_odds > LARGEST_SHOWN_ODDS else ""
     return f"{float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f} times{more}"
 
 
@@ -210,7 +210,7 @@ def adequacy_text(found: Adequacy) -> str:
         slow = "; what is left is autocorrelated, noise or the law's own" * bool(np.isfinite(found.correlation))
         scatter = f" (rates of tests scatter by {scatter_text(found.rate_scatter)})" if found.rate_scatter > 0 else ""
         doubt = " (far larger than what the readings show: check its unit)"
-        scatter += doubt * (found.chi_square < IMPLAUSIBLE_CHI_SQUARE)
+        scatter += doubt if found.chi_square < IMPLAUSIBLE_CHI_SQUARE else ""
         said = f"is not rejected by the tests at their {source} noise{qualification(found)}{scatter}"
         return f"{said}: {_chi_square(found)}, {_p_value(found)}{slow}"
     if found.contradicting is not None and not found.outputs:

@@ -365,8 +365,8 @@ def test_the_terminal_and_the_report_state_one_chi_square_of_a_test() -> None:
     readings = judged_readings(fit)
     assert readings is not None
     rows = [line.split() for line in fit.details().splitlines() if line.startswith("  bar ")]
-    # name in two words, condition in four ("727 °C, strain 0.001"), error, chi2
-    assert [float(row[7]) for row in rows] == [
+    # name in two words, condition in five ("727 °C, 0.1 % strain"), error, chi2
+    assert [float(row[8]) for row in rows] == [
         pytest.approx(readings.chi_square(k), rel=6e-3) for k in range(len(tests))
     ]
     assert fit.tests[2].outputs[0].errors.chi_square > 2.0 * readings.chi_square(2)
