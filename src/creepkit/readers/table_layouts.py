@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 from creepkit.errors import HistoryError, quoted
@@ -113,7 +113,10 @@ def with_one_clock(table: CellTable, known: Terms) -> CellTable:
     if len(days) != 1 or len(times) != 1 or days == times:
         return table
     (day,), (clock,) = days, times
-    dates = [*accumulate((row.cells[day].removesuffix(" 00:00:00") for row in table.rows), lambda a, b: b or a)]
+    written = [row.cells[day].removesuffix(" 00:00:00") for row in table.rows]
+    dates = list[str]()
+    for date in written:  # once a day in many a logbook
+        dates.append(date or (dates[-1] if dates else ""))
     joined = [
         " ".join([date, _CLOCK.sub(r"\1:\2", row.cells[clock])]) for date, row in zip(dates, table.rows, strict=True)
     ]

@@ -56,8 +56,8 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
     lines = [
         f"rates are compared at {at}; by an alloy's own tests they are known to a factor of {np.exp(noise):.2f}",
         f"stress exponents of alloys left out are predicted within {exponent.left_out_error:.2g}",
-        f"{round(rate.left_out_coverage * len(rate.values))} of {len(rate.values)} rates lie in the 95 % intervals that "
-        f"the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
+        f"{round(rate.left_out_coverage * len(rate.values))} of {len(rate.values)} rates lie in the 95 % intervals "
+        f"that the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
         f"nearly, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
     ]
     proposals = mapped.propose()
@@ -82,7 +82,7 @@ def formula_text(regression: CompositionRegression) -> str:
 
 
 def _shared_blocks(mapped: CompositionMap) -> list[Block]:
-    """The alloys to whom the others give another rate, by more than CHANGED, or another law; else that there are none."""
+    """The alloys to whom the others give another rate, by more than CHANGED, or another law."""
     rate, laws = mapped.log_rate, mapped.laws
     value, sd, share = rate.shared
     changed = np.abs(value - rate.values) > CHANGED

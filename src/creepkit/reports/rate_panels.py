@@ -93,7 +93,7 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
         for celsius in _drawn_temperatures(tested_temperatures(fit.histories))
         for T in [celsius + ZERO_CELSIUS]
     ]
-    points = [RatePoints("law × own rate of each test", *np.array(own).T)] if own else []
+    points = [RatePoints("each test: the law at its own rate", *np.array(own).T)] if own else []
     _draw(axes, fit, curves, points, "95 % band: law")
     reference = fit.reference
     initial = reference.conditions_text(fit.law).replace(", ", "\n", 1)

@@ -68,7 +68,7 @@ CAUTIONS = {
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {exponent}",
     # offsets or drifts would move rates
-    "not included": "intervals do not include {kinds} (of each test by itself): rates of the law move by {change}",
+    "not included": "intervals leave out {kinds}, another in each test: the law, their mean, would move by {change}",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }

@@ -435,7 +435,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"its sum with {100 * SHARE:.0f} % of the rate by {other.law.name}"
+    description = f"a share of {100 * SHARE:.0f} % of the rate by {other.law.name}"
     return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
 
 

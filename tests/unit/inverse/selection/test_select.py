@@ -57,7 +57,7 @@ def test_the_planted_law_is_singled_out_and_what_constant_loads_allow_beside_it_
     """Under one constant stress hardening by strain and by time are one curve: a share of it cannot be excluded."""
     assert ranking.best.law.name == "strain-hardening"
     assert ranking.decisive
-    assert "; but its sum with 30 % of the rate by time-hardening " in ranking.verdict
+    assert "; but a share of 30 % of the rate by time-hardening " in ranking.verdict
     assert ranking.laws[0].chi_square == pytest.approx(120 - 3, abs=3 * np.sqrt(2 * 120))
 
 
