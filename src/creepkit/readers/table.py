@@ -35,7 +35,7 @@ from creepkit.files.delimited_text import (
     parse_numbers,
     two_readings,
 )
-from creepkit.readers.ends_of_tests import kind_of_column
+from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.questions import Answer, Question
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
 
@@ -279,15 +279,21 @@ def _without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
     )
 
 
-# ---- powers of ten -------------------------------------------------------------------------------------------------
+# ---- footnotes and powers of ten -----------------------------------------------------------------------------------
 
 
 _POWER = re.compile(r"(?<=[\d.,])\s*[x×·*∙]\s*10\s*\^?\s*\(?([+\-−]?\d+|[⁻⁺⁰¹²³⁴-⁹]+)\)?")
 """A power of ten, written as such."""
 
 
+_MARK = r"\*{1,3}|[†‡§¶]+|[¹²³]\)|(?<![\w(])[1-9]\)|(?<![^\W\d_])(?<!\()[a-h]\)|\([a-h]\)"
+_FOOTNOTE, _MARKED = re.compile(rf"({_MARK})[:=]?\s*(\S.*)"), re.compile(rf"(.*?\S)\s*({_MARK})(\s*[(\[].*)?")
+_IN_UNIT = re.compile(r"(?:(?:values )?(?:in|en) )?(.{1,8}?)(?:[,;.].*)?", re.IGNORECASE)
+"""A footnote, a cell that is marked by one, and a footnote that is a unit."""
+
+
 def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
-    """The table without powers of ten, signs between thousands, and logarithms.
+    """The table without powers of ten, footnote marks, signs between thousands, and logarithms.
 
     is_stated : whether the decimal sign is stated.
     """
@@ -295,11 +301,39 @@ def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
     for k, row in enumerate(rows):
         if any("10" in cell and _POWER.search(cell) for cell in row.cells):
             rows[k] = TableRow(row.line, [_POWER.sub(_exponent, cell) for cell in row.cells])
-    return _without_logarithms(_without_thousands(replace(table, rows=rows), is_stated=is_stated))
+    table = _without_footnotes(replace(table, rows=rows))
+    return _without_logarithms(_without_thousands(table, is_stated=is_stated))
 
 
 def _exponent(power: re.Match[str]) -> str:
     return f"e{unicodedata.normalize('NFKC', power[1]).replace('−', '-')}"
+
+
+def _without_footnotes(table: CellTable) -> CellTable:
+    """The table without footnotes below it and their marks; its header tells the texts, a unit takes the place of one.
+
+    A text on how a test ended stays where it is, with its marks.
+    """
+    rows, notes, marked = list(table.rows), dict[str, TableRow](), dict[str, list[str]]()
+    while rows and (note := _FOOTNOTE.fullmatch(", ".join(filter(None, rows[-1].cells)))):
+        notes[note[1]] = TableRow(rows.pop().line, [note[2]])
+    marks = {sign.strip("()"): sign for sign in notes} | {sign: sign for sign in notes}
+
+    def unmarked(cell: str) -> str:
+        found = _MARKED.fullmatch(cell)
+        sign = (marks.get(found[2]) or marks.get(found[2].strip("()"), "")) if found else ""
+        is_unit = found and unit_suffix(found[2]) and not is_number(found[1], table.dialect)
+        if not found or not sign or is_unit or end_said_by(notes[sign].cells[0]):
+            return cell
+        marked.setdefault(sign, []).append(found[1])
+        unit = _IN_UNIT.fullmatch(notes[sign].cells[0])
+        return f"{found[1]} ({unit[1]})" if unit and unit_suffix(unit[1]) else f"{found[1]}{found[3] or ''}"
+
+    rows = [TableRow(row.line, [*map(unmarked, row.cells)]) for row in rows] if notes else rows
+    texts = {sign: (f"{notes[sign].cells[0]} (of {'; '.join(of)})", notes[sign].line) for sign, of in marked.items()}
+    told = {f"label footnote {sign}": SourceText(text, table.location(n)) for sign, (text, n) in texts.items()}
+    below = [row for row in table.rows[len(rows) :] if row.line not in {line for _, line in texts.values()}]
+    return replace(table, rows=[*rows, *below], header={**table.header, **told})
 
 
 # ---- comments ------------------------------------------------------------------------------------------------------

@@ -140,9 +140,9 @@ def _rate_text(history: History) -> str:
 
 def _end_text(history: History) -> str:
     if history.unruptured and not history.outputs:
-        return f"stopped before rupture at {history.times[-1] / SECONDS_PER_HOUR:.4g} h"
+        return f"stopped before rupture at {time_text(float(history.times[-1]))}"
     if history.rupture_time is not None:
-        return f"ruptured at {history.rupture_time / SECONDS_PER_HOUR:.4g} h"
+        return f"ruptured at {time_text(history.rupture_time)}"
     return "stopped before rupture" if history.unruptured else ""
 
 

@@ -530,3 +530,22 @@ def test_a_dimple_is_read_by_the_symbols_of_its_pressures_and_the_plain_name_of_
     (one,) = read(tmp_path, f"{head}time (h);amplitude (mm)\n1;0,05\n3;0,08\n5;0,12\n")
     assert (one.specimen, one.geometry) == ("bulge", {"apex_thickness": 0.48})
     assert (one.loading.P1, one.loading.P2, one.loading.Tj) == pytest.approx((8.0, 10.0, 4 * 3600.0))
+
+
+FOOTNOTES = """Creep rupture data, Grade 91 plate
+Heat,Temp. (a),Stress (MPa),Min. creep rate (%/h),Time to rupture (h)
+MGA,600,140,3.6 x 10^-3*,1203
+MGB,600,120,7.2 x 10^-4,9020
+MGB,650,60,1.8E-4,>20000 b)
+* extensometer slipped at 3 %
+(a) in °C
+b) still running
+"""
+
+
+def test_footnotes_are_no_part_of_numbers_and_stand_with_the_tests(tmp_path):
+    tests = read(tmp_path, FOOTNOTES, name="data.csv")
+    assert [one.minimum_rate for one in tests] == pytest.approx([1e-8, 2e-9, 5e-10])
+    assert [one.temperature for one in tests] == pytest.approx([873.15, 873.15, 923.15])
+    assert [one.unruptured for one in tests] == [False, False, True]
+    assert tests[0].labels["footnote *"] == "extensometer slipped at 3 % (of 3.6e-3)"
