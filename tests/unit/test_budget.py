@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 747,
     "quality": 1143,
-    "readers": 6515,
+    "readers": 6525,
     "records": 2392,
     "registry": 608,
     "reports": 6436,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_132
+TESTS = 30_142
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

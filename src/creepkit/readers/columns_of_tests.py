@@ -129,9 +129,11 @@ _OF_NO_TEST = re.compile(
 
 _OF_OTHERS = re.compile(r"elong|dehnung\b|strain\b|allong|parameter|ratio|log|sd\b|std|error|stress\b|date|datum")
 _FACTOR = re.compile(
-    r"[x×*·]?\s*(?<![\d./])(?<!/ )(?:10\s*\^?\s*([+\-−]\d+|(?<=\^)\d+|(?<=\^ )\d+|[⁻⁺]?[⁰¹²³⁴-⁹]+)|1[eE]([+-]?\d+))\s*"
+    r"[x×*·]?\s*(?<![\d.])(?:10\s*\^?\s*([\-−]\d+|⁻[⁰¹²³⁴-⁹]+)|1[eE](-\d+)"
+    r"|(?<!/)(?<!/ )(?:10\s*\^?\s*(\+\d+|(?<=\^)\d+|(?<=\^ )\d+|⁺?[⁰¹²³⁴-⁹]+)|1[eE](\+?\d+)))\s*"
 )
-"""A power of ten by which numbers were multiplied, or that stands in their unit; rates are small, so it divides."""
+"""A power of ten by which numbers were multiplied, or that stands in their unit; rates are small, so it divides. A
+positive one behind a stroke belongs to the time there: %/10^3 h."""
 
 
 _PER_CENT = r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|pour ?cent\b)"
@@ -147,7 +149,7 @@ def column_called(written: str) -> TestColumn:
         rate = column_called(
             re.sub(r"(?<=[(\[]) (?=\S)| (?=[)\]])", "", plain).replace("(/", "(1/").replace("[/", "[1/")
         )
-        exponent = int(unicodedata.normalize("NFKC", power[1] or power[2]).replace("−", "-"))
+        exponent = int(unicodedata.normalize("NFKC", next(filter(None, power.groups()))).replace("−", "-"))
         if rate.kind is RATE:
             return replace(rate, factor=10.0 ** -abs(exponent))
     if (strain := _strain_reached(written)) is not None:

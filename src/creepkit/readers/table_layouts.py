@@ -347,8 +347,8 @@ def _are_pairs(headed: HeadedTable) -> bool:
 def _tests_of_pairs(headed: HeadedTable) -> list[TabulatedTest]:
     names, times = headed.names, headed.times
     if first := next(filter(None, names[: times[0]]), ""):
-        what = f"the column '{quoted(first)}' stands before the first time"
-        raise HistoryError(f"{headed.place}: {what}; begin the columns of each test with time")
+        what = f"the column '{quoted(first)}' stands before the first time; begin the columns of each test with time"
+        raise HistoryError(f"{headed.place}: {what}")
     tests = []
     for start, end in zip(times, [*times[1:], len(names)], strict=True):
         named = {k: test_and_column(names[k], headed.known) for k in range(start, end) if names[k]}
@@ -463,11 +463,13 @@ def _tests_of_blocks(
         check_columns(f"{place}, test '{quoted(name)}'", columns)
         # A time goes on where another test does, and the temperature of a furnace, too.
         others = [k for k, one in enumerate(columns) if known.quantity(one) not in ("time", "temperature")]
-        cut = with_columns(rows, list(test.columns))
-        cut = [row for row in cut if not all(is_missing(row.cells[k]) for k in others or range(1, len(columns)))]
+        own_rows = with_columns(rows, list(test.columns))
+        cut = [row for row in own_rows if not all(is_missing(row.cells[k]) for k in others or range(1, len(columns)))]
+        for row in own_rows[own_rows.index(cut[-1]) + 1 :] if cut else ():
+            if row.cells[0][:1].isalpha():  # "rupture", below its last reading
+                entries[f"label line {row.line}"] = SourceText(row.cells[0], table.location(row.line))
         if not cut:
-            what = f"test '{quoted(name)}' has no rows below the names of its columns"
-            raise HistoryError(f"{place}: {what}; remove it or fill it")
+            raise HistoryError(f"{place}: test '{quoted(name)}' has no rows below its names; remove it or fill it")
         own = replace(
             table.assuming(*head.assumptions),
             rows=cut,

@@ -109,9 +109,12 @@ def read_answers(file: Path) -> dict[str, dict[str, Any]]:
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise HistoryError(f"{file}: is no TOML ({quoted(reason, 120)}); correct or remove it") from None
-    errors = list[HistoryError]()
-    known = HeaderVocabulary().terms()
+    errors, known = list[HistoryError](), HeaderVocabulary().terms()
+    names = [path.name for path in file.parent.iterdir()]
     for pattern, table in data.items():
+        if "." not in pattern and not any(fnmatchcase(name, pattern) for name in names):
+            what = f"'{quoted(pattern)}' is no file here; write the name of one, or a pattern such as"
+            errors.append(HistoryError(f'{file}: {what} ["*.csv"]'))
         if not isinstance(table, dict):
             what = f"'{quoted(pattern)}' stands in no table; begin with the files that it is about, such as"
             errors.append(HistoryError(f'{file}: {what} ["*.csv"]'))

@@ -154,7 +154,10 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
     "name": ("test name", "test id", "test", "試験片番号"),
-    "label heat": ("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
+    "label heat": (
+        *("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
+        "reference code",
+    ),
     "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
     "label operator": ("prüfer", "tester"),
     "label elongation_pct": (

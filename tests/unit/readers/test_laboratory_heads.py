@@ -549,3 +549,18 @@ def test_footnotes_are_no_part_of_numbers_and_stand_with_the_tests(tmp_path):
     assert [one.temperature for one in tests] == pytest.approx([873.15, 873.15, 923.15])
     assert [one.unruptured for one in tests] == [False, False, True]
     assert tests[0].labels["footnote *"] == "extensometer slipped at 3 % (of 3.6e-3)"
+
+
+def test_a_power_of_ten_behind_the_stroke_of_a_quantity_and_a_heat_that_stands_once(tmp_path):
+    """14.6 1/s was read of 14.6e-8: a quantity over its unit, as ISO 80000 heads columns."""
+    text = "Reference code,T / °C,Stress / MPa,min. creep rate / {}\nMGA,1000,60,14.6\n,,80,44.2\n"
+    for head, unit in (("10^-8 s^-1", 1e-8), ("10⁻⁸ s⁻¹", 1e-8), ("1e-6 h^-1", 1e-6 / 3600), ("%/10^3 h", 1e-5 / 3600)):
+        tests = read(tmp_path, text.format(head), name="data.csv")
+        assert [one.minimum_rate for one in tests] == pytest.approx([14.6 * unit, 44.2 * unit])
+        assert [one.labels["heat"] for one in tests] == ["MGA", "MGA"]
+
+
+def test_a_word_below_the_last_reading_of_a_curve_ends_it_alone(tmp_path):
+    text = "C1: 130 MPa;;C2: 150 MPa;\nt (h);strain (%);t (h);strain (%)\n0;0;0;0\n10;1;5;1\n20;9;9;2\nrupture;;;\n"
+    one, other = read(tmp_path, text, name="650C.csv")
+    assert (one.rupture_time, other.rupture_time, other.unruptured) == (72000.0, None, False)
