@@ -212,10 +212,7 @@ REFUSED = [
         "Time (h);A1 strain (%);A2 strain (%)\n0;0;0\n1;1\n",
         "x.csv:5: number of cells 2, of columns 3; write one cell a column, separated by semicolons, empty",
     ),
-    (
-        "Time (h);A1 strain (%);A2 strain (%)\n0;0;\n1;1;\n",
-        "x.csv:3: test 'A2' has no rows below its names",
-    ),
+    ("Time (h);A1 strain (%);A2 strain (%)\n0;0;\n1;1;\n", "x.csv:3: test 'A2' has no rows below its names"),
     ("5;6\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: the number 5 stands above the names of the col"),
     ("Stress (MPa);70\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: 'stress_MPa' was already given"),
     ("# decimal: dot\ntime_h;strain_pct\n0;0\n1;1\n", "x.csv:3: decimal is 'dot'; allowed: point"),
