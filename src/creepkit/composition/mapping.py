@@ -23,6 +23,7 @@ from creepkit.composition.forms import LawsByComposition
 from creepkit.composition.regression import FEWEST_ALLOYS, CompositionRegression
 from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import STATE_LIMITS
@@ -36,7 +37,7 @@ from creepkit.screening.alloys import (
     compositions_of_labels,
     resolve_compositions,
 )
-from creepkit.screening.results import ScreeningResult
+from creepkit.screening.results import AlloyResult, ScreeningResult
 
 WIDEST = 5.0
 """Of the standard deviation of ln of a rate, beyond which tests say nothing of it."""
@@ -193,7 +194,7 @@ APART = 0.01
 
 @checked
 def composition_map(
-    plate: ScreeningResult | Mapping[str, Any],
+    plate: ScreeningResult | Mapping[str, Identification | Ranking | AlloyResult],
     compositions: Compositions | str | Path | None = None,
     *,
     stress: float | None = None,
