@@ -18,7 +18,7 @@ BUDGET = {
     "app": 596,
     "cameras": 823,
     "cli": 2135,
-    "composition": 370,
+    "composition": 371,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_139
+TESTS = 30_141
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
