@@ -23,7 +23,7 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 3740,
+    "exporters": 3306,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,

@@ -70,7 +70,7 @@ def follow(name, updates, seeds, pieces):
         path, point = random_path(source, seed, pieces)
         exact = reference(source, path, point)
         assert error(driven(update, path, point, 4, count), exact) < 3e-4
-        found = driven(update, path, point, 1000, count)
+        found = driven(update, path, point, 1500, count)
         assert error(found, exact) < 1e-6
         assert found.state == pytest.approx(exact.state, rel=1e-6)
         for increment in list(path.increments(3))[::3]:

@@ -1,20 +1,19 @@
 """An algorithm that is written once, in a small part of Python, printed as C99 or as fixed-form Fortran.
 
 That part is: functions of numbers and of arrays of fixed size, `for` over ranges, `while`, `if`, assignments to names
-and to elements, and calls. Numbers in capitals are constants, which each text puts in; a branch that they rule out, and
-a loop that they leave empty, is not printed. Names that are assigned are double precision unless annotated.
+and to elements, and calls. Arrays that are arguments have their shape as annotation. Numbers in capitals are constants;
+a branch that they rule out, and a loop that they leave empty, is not printed. What is assigned is double precision
+unless it is annotated.
 """
 
 from __future__ import annotations
 
 import ast
-import inspect
 import io
+import re
 import tokenize
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from types import ModuleType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from creepkit.exporters.creep_subroutine import fortran_number, fortran_statements
 from creepkit.exporters.law_description import comment_lines
@@ -22,7 +21,6 @@ from creepkit.exporters.law_description import comment_lines
 ConstantValue = int | float | tuple[float, ...]
 
 _LEVELS: tuple[tuple[type[ast.AST], ...], ...] = (
-    (ast.IfExp,),
     (ast.Or,),
     (ast.And,),
     (ast.Not,),
@@ -30,202 +28,176 @@ _LEVELS: tuple[tuple[type[ast.AST], ...], ...] = (
     (ast.Add, ast.Sub),
     (ast.Mult, ast.Div, ast.FloorDiv),
     (ast.USub,),
+    (ast.Pow, ast.Mod),
 )
 _PRECEDENCE = {operator: level for level, operators in enumerate(_LEVELS) for operator in operators}
-"""How strongly operators bind, here, in C and in Fortran; all others are printed as calls."""
+"""How strongly operators bind, here, in C and in Fortran."""
 
+_SIGNS = {
+    ast.Add: " + ", ast.Sub: " - ", ast.Mult: " * ", ast.Div: " / ", ast.FloorDiv: " / ", ast.Eq: " == ",
+    ast.NotEq: " != ", ast.Lt: " < ", ast.LtE: " <= ", ast.Gt: " > ", ast.GtE: " >= ", ast.And: " && ",
+    ast.Or: " || ", ast.Not: "!", ast.USub: "-",
+}  # fmt: skip
+"""Operators of C."""
 
-@dataclass(frozen=True)
-class Algorithm:
-    """A module that holds one, with the constants of one text.
+_MATHEMATICS = ("abs", "exp", "float", "log", "max", "min", "sqrt")
+"""Functions that are none of the algorithm's own."""
 
-    functions : {name: its tree}; comments : {line: text}, of lines that hold nothing else; shapes : of arrays that are
-    arguments, {name: what their lengths are}.
-    """
-
-    functions: Mapping[str, ast.FunctionDef]
-    comments: Mapping[int, str]
-    shapes: Mapping[str, tuple[ast.expr, ...]]
-    constants: Mapping[str, ConstantValue]
-
-    def known(self, node: ast.AST) -> ConstantValue | None:
-        """The number that an expression of constants amounts to, None where it is none."""
-        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-            return node.value
-        if isinstance(node, ast.Name):
-            return self.constants.get(node.id)
-        if isinstance(node, (ast.BinOp, ast.Compare)):
-            other = node.right if isinstance(node, ast.BinOp) else node.comparators[0]
-            left, right = self.known(node.left), self.known(other)
-            if isinstance(left, int) and isinstance(right, int):
-                operator = node.op if isinstance(node, ast.BinOp) else node.ops[0]
-                return {ast.Add: left + right, ast.Sub: left - right, ast.Eq: left == right}.get(type(operator))
-        return None
-
-
-def algorithm(module: ModuleType, constants: Mapping[str, ConstantValue]) -> Algorithm:
-    """Read a module's text; constants : {name: number} in the place of the module's own."""
-    text = inspect.getsource(module)
-    tree = ast.parse(text)
-    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
-    assigned = (node for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict))
-    pairs = [(k, v) for node in assigned for k, v in zip(node.value.keys, node.value.values, strict=True)]  # type: ignore[attr-defined]
-    shapes = {ast.literal_eval(k): tuple(v.elts) for k, v in pairs if isinstance(v, ast.Tuple)}
-    return Algorithm(functions, comments, shapes, constants)
+Shape = Sequence[ast.expr]
 
 
 class AlgorithmPrinter:
     """What both languages share: expressions, and the walk through statements.
 
-    prefix : of the functions' names. forms : of statements, by the name of the construct.
+    text : of the algorithm. constants : {name: number}, beside those that the text gives. prefix : of the functions'
+    names.
     """
 
-    operators: ClassVar[Mapping[type[ast.AST], str]]
+    signs: ClassVar[Mapping[type[ast.AST], str]] = _SIGNS
     forms: ClassVar[Mapping[str, str]]
-    functions: ClassVar[Mapping[str, str]]
+    names: ClassVar[Mapping[str, str]]
     kinds: ClassVar[Mapping[str, str]]
     element: ClassVar[tuple[str, str, str]]
 
-    def __init__(self, source: Algorithm, prefix: str) -> None:
-        self.source, self.prefix = source, prefix
-        self.function: ast.FunctionDef = next(iter(source.functions.values()))
+    def __init__(self, text: str, constants: Mapping[str, ConstantValue], prefix: str) -> None:
+        tree = ast.parse(text)
+        self.prefix = prefix
+        self.functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        stated = [node for node in tree.body if isinstance(node, ast.Assign)]
+        values = {ast.unparse(node.targets[0]): ast.literal_eval(node.value) for node in stated}
+        self.numbers: dict[str, ConstantValue] = {**values, **constants}
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        self.comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
+        self.function = next(iter(self.functions.values()))
         self.used: dict[str, None] = {}
 
     # ---- expressions -----------------------------------------------------------------------------------------------
 
-    def text(self, node: ast.expr, above: int = 0) -> str:
+    def known(self, node: ast.AST) -> ConstantValue | None:
+        """The number that an expression of constants amounts to, None where it is none."""
+        if isinstance(node, (ast.Constant, ast.Name)):
+            return node.value if isinstance(node, ast.Constant) else self.numbers.get(node.id)  # type: ignore[return-value]
+        if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
+            left, right = self.known(node.left), self.known(node.right)
+            if isinstance(left, int) and isinstance(right, int):
+                return left + right if isinstance(node.op, ast.Add) else left - right
+        return None
+
+    def text(self, node: Any, above: int = 0) -> str:
         """An expression; above : how strongly what stands around it binds."""
         if isinstance(node, ast.Constant):
             return self.number(node.value)
         if isinstance(node, ast.Name):
-            if node.id in self.source.constants:
+            if node.id in self.numbers:
                 self.used[node.id] = None
-            return _printed(node)
+            return node.id.lstrip("_")
         if isinstance(node, ast.Subscript):
-            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
             opening, comma, closing = self.element
+            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
             return f"{self.text(node.value)}{opening}{comma.join(map(self.text, parts))}{closing}"
         if isinstance(node, ast.Call):
-            return self.call(node)
+            name = ast.unparse(node.func)
+            called = self.names.get(name, name) if name in _MATHEMATICS else f"{self.prefix}_{name}"
+            return f"{called}({', '.join(map(self.text, node.args))})"
         if isinstance(node, ast.IfExp):
-            if (known := self.source.known(node.test)) is not None:
-                return self.text(node.body if known else node.orelse, above)
-            return self.choice(node)
-        return self.operation(node, above)
-
-    def operation(self, node: ast.expr, above: int) -> str:
-        """An operator with its operands, in brackets where what stands around binds as strongly."""
-        if isinstance(node, ast.BinOp) and type(node.op) not in self.operators:
-            form = self.functions[type(node.op).__name__]
-            return form.format(self.text(node.left, 9), self.text(node.right, 9))
-        if isinstance(node, ast.UnaryOp):
-            level = _PRECEDENCE[type(node.op)]
-            text = self.operators[type(node.op)] + self.text(node.operand, level + 1)
-        elif isinstance(node, ast.BoolOp):
-            level = _PRECEDENCE[type(node.op)]
-            text = self.operators[type(node.op)].join(self.text(value, level + 1) for value in node.values)
-        else:
-            assert isinstance(node, (ast.BinOp, ast.Compare)), ast.dump(node)
-            is_sum = isinstance(node, ast.BinOp)
-            operator, right = (node.op, node.right) if is_sum else (node.ops[0], node.comparators[0])  # type: ignore[union-attr]
-            level = _PRECEDENCE[type(operator)]
-            text = f"{self.text(node.left, level)}{self.operators[type(operator)]}{self.text(right, level + 1)}"
+            return self.forms["choice"].format(*(self.text(part, 1) for part in (node.test, node.body, node.orelse)))
+        operator, operands = _operation(node)
+        level = _PRECEDENCE[type(operator)]
+        if type(operator) not in self.signs:
+            return self.names[type(operator).__name__].format(*(self.text(part, level + 1) for part in operands))
+        sign = self.signs[type(operator)]
+        first, *rest = (self.text(part, level + (k > 0 or len(operands) == 1)) for k, part in enumerate(operands))
+        text = sign.join((first, *rest)) if rest else sign + first
         return f"({text})" if level < above else text
 
-    def call(self, node: ast.Call) -> str:
-        """A call of a function of the algorithm, or of one that every language has."""
-        assert isinstance(node.func, ast.Name)
-        name, arguments = node.func.id, [self.text(a) for a in node.args]
-        if name in self.source.functions:
-            return f"{self.prefix}_{name}({', '.join(arguments)})"
-        return f"{self.functions.get(name, name)}({', '.join(arguments)})"
-
-    def number(self, value: object) -> str:
+    def number(self, value: Any) -> str:
         """A number or a truth value."""
-        raise NotImplementedError
-
-    def choice(self, node: ast.IfExp) -> str:
-        """One of two expressions."""
         raise NotImplementedError
 
     # ---- statements ------------------------------------------------------------------------------------------------
 
     def block(self, body: Sequence[ast.stmt], depth: int) -> Iterator[str]:
         """Statements, each at its depth, with the comments above them."""
-        indent = "  " * depth
         for node in body:
-            comment = self.source.comments.get(node.lineno - 1)
-            if comment:
+            if comment := self.comments.get(node.lineno - 1):
                 yield from self.comment([comment], depth)
             if isinstance(node, ast.For):
-                yield from self.loop(node, depth)
+                yield from self._loop(node, depth)
             elif isinstance(node, ast.While):
-                yield indent + self.forms["while"].format(self.text(node.test))
-                yield from self.block(node.body, depth + 1)
-                yield indent + self.forms["end while"]
+                yield from self._around("while", [self.text(node.test)], node.body, depth)
+                yield "  " * depth + self.forms["end while"]
             elif isinstance(node, ast.If):
-                yield from self.branches(node, depth, "if")
+                yield from self._branches(node, depth, "if")
             else:
-                yield from (indent + line for line in self.simple(node))
+                yield from ("  " * depth + line for line in self._simple(node))
 
-    def loop(self, node: ast.For, depth: int) -> Iterator[str]:
-        """A loop over a range, unless it is empty."""
-        assert isinstance(node.target, ast.Name)
+    def _around(self, form: str, parts: Sequence[str], body: Sequence[ast.stmt], depth: int) -> Iterator[str]:
+        yield "  " * depth + self.forms[form].format(*parts)
+        yield from self.block(body, depth + 1)
+
+    def _loop(self, node: ast.For, depth: int) -> Iterator[str]:
         assert isinstance(node.iter, ast.Call)
-        first, last = node.iter.args if len(node.iter.args) == 2 else (ast.Constant(0), node.iter.args[0])
-        bounds = self.source.known(first), self.source.known(last)
-        if isinstance(bounds[0], int) and isinstance(bounds[1], int) and bounds[0] >= bounds[1]:
+        first, last = ([ast.Constant(0), *node.iter.args])[-2:]
+        low, high = self.known(first), self.known(last)
+        if isinstance(low, int) and isinstance(high, int) and low >= high:
             return
-        head = self.forms["for"].format(name=_printed(node.target), first=self.text(first), last=self.text(last, 5))
-        yield "  " * depth + head
-        yield from self.block(node.body, depth + 1)
+        parts = [self.text(node.target), self.text(first), self.text(last, 5)]
+        yield from self._around("for", parts, node.body, depth)
         yield "  " * depth + self.forms["end for"]
 
-    def branches(self, node: ast.If, depth: int, form: str) -> Iterator[str]:
-        """If, else if, else: of a condition that is known, the branch that is taken."""
-        known = self.source.known(node.test)
+    def _branches(self, node: ast.If, depth: int, form: str) -> Iterator[str]:
+        known = self.known(node.test)
         if known is not None:
             yield from self.block(node.body if known else node.orelse, depth)
             return
-        yield "  " * depth + self.forms[form].format(self.text(node.test))
-        yield from self.block(node.body, depth + 1)
+        yield from self._around(form, [self.text(node.test)], node.body, depth)
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            yield from self.branches(node.orelse[0], depth, "else if")
+            yield from self._branches(node.orelse[0], depth, "else if")
             return
         if node.orelse:
-            yield "  " * depth + self.forms["else"]
-            yield from self.block(node.orelse, depth + 1)
+            yield from self._around("else", [], node.orelse, depth)
         yield "  " * depth + self.forms["end if"]
 
-    def simple(self, node: ast.stmt) -> Iterator[str]:
+    def _simple(self, node: Any) -> list[str]:
         """A statement of one line; of those that make an array nothing, for it is declared."""
-        if isinstance(node, ast.Assign):
-            if not _is_array(node.value):
-                yield self.forms["assign"].format(self.text(node.targets[0]), self.text(node.value))
-        elif isinstance(node, ast.AnnAssign):
-            assert node.value is not None
-            yield self.forms["assign"].format(self.text(node.target), self.text(node.value))
-        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-            yield self.forms["call"].format(self.text(node.value))
-        elif isinstance(node, ast.Return) and node.value is not None:
-            names = {"name": f"{self.prefix}_{self.function.name}", "value": self.text(node.value)}
-            yield from self.forms["return"].format(**names).split("\n")
-        elif isinstance(node, ast.Break):
-            yield self.forms["break"]
+        if isinstance(node, (ast.Assign, ast.AnnAssign)):
+            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+            return [] if _lengths(node.value) else [f"{self.text(target)} = {self.text(node.value)}{self.forms['end']}"]
+        if isinstance(node, ast.Return):
+            name = f"{self.prefix}_{self.function.name}"
+            return self.forms["return"].format(name, self.text(node.value)).split("\n")
+        if isinstance(node, ast.Break):
+            return [self.forms["break"]]
+        is_call = isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
+        return [self.forms["call"].format(self.text(node.value))] if is_call else []
 
     # ---- functions -------------------------------------------------------------------------------------------------
 
     def definition(self, name: str) -> list[str]:
         """A function of the algorithm, with its comment."""
-        self.function = self.source.functions[name]
-        self.used = {}
+        self.function, self.used = self.functions[name], {}
         body = list(self.block(self.function.body, 1))
         documentation = (ast.get_docstring(self.function) or "").splitlines()
-        return ["", *self.comment(documentation, 0), *self.framed(body)]
+        arguments = {a.arg: _variable(a.annotation) for a in self.function.args.args}
+        words = {word for line in body for word in re.findall(r"\w+", line)}
+        local = {k: v for k, v in self._assigned().items() if k in words and k not in arguments}
+        return ["", *self.comment(documentation, 0), *self.framed(body, arguments, local)]
 
-    def framed(self, body: list[str]) -> Iterator[str]:
+    def _assigned(self) -> dict[str, tuple[str, Shape]]:
+        """{name: (kind, shape)} of what a function assigns."""
+        result: dict[str, tuple[str, Shape]] = {}
+        for node in ast.walk(self.function):
+            if isinstance(node, ast.For):
+                result.setdefault(self.text(node.target), ("int", []))
+            elif isinstance(node, ast.AnnAssign):
+                result[ast.unparse(node.target)] = _variable(node.annotation)
+            elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                result.setdefault(node.targets[0].id, ("float", _lengths(node.value)))
+        return result
+
+    def framed(
+        self, body: list[str], arguments: Mapping[str, tuple[str, Shape]], local: Mapping[str, tuple[str, Shape]]
+    ) -> Iterator[str]:
         """A body with the function's head and declarations."""
         raise NotImplementedError
 
@@ -233,183 +205,135 @@ class AlgorithmPrinter:
         """Lines of comment."""
         raise NotImplementedError
 
-    def local_variables(self, printed: Sequence[str]) -> dict[str, tuple[str, list[ast.expr]]]:
-        """{name: (kind, shape)} of what a function assigns and its printed lines mention."""
-        words = {word for line in printed for word in _words(line)}
-        result: dict[str, tuple[str, list[ast.expr]]] = {}
-        arguments = {a.arg for a in self.function.args.args}
-        for node in ast.walk(self.function):
-            if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
-                result.setdefault(_printed(node.target), ("int", []))
-            elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-                result[node.target.id] = (ast.unparse(node.annotation), [])
-            elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-                shape = node.value.args[0] if isinstance(node.value, ast.Call) and _is_array(node.value) else None
-                lengths = [] if shape is None else shape.elts if isinstance(shape, ast.Tuple) else [shape]
-                result.setdefault(node.targets[0].id, ("float", list(lengths)))
-        return {name: found for name, found in result.items() if name in words and name not in arguments}
 
-    def returned(self) -> str:
-        """The kind of what a function returns."""
-        assert self.function.returns is not None
-        return self.kinds[ast.unparse(self.function.returns)]
+def _operation(node: Any) -> tuple[ast.AST, list[ast.expr]]:
+    """The operator of an expression, and its operands."""
+    if isinstance(node, ast.BinOp):
+        return node.op, [node.left, node.right]
+    if isinstance(node, ast.Compare):
+        return node.ops[0], [node.left, node.comparators[0]]
+    return node.op, node.values if isinstance(node, ast.BoolOp) else [node.operand]
 
 
-def _printed(name: ast.Name) -> str:
-    """A name, of loops that need none without its underscore."""
-    return name.id.lstrip("_")
+def _lengths(value: Any) -> Shape:
+    """The shape of the array that an expression makes; nothing of any other."""
+    if not (isinstance(value, ast.Call) and ast.unparse(value.func) == "zeros"):
+        return []
+    return value.args[0].elts if isinstance(value.args[0], ast.Tuple) else value.args
 
 
-def _kind(argument: ast.arg) -> str:
-    """Its annotation."""
-    return ast.unparse(argument.annotation) if argument.annotation else ""
-
-
-def _is_array(value: ast.expr) -> bool:
-    return isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == "zeros"
-
-
-def _words(line: str) -> list[str]:
-    return "".join(c if c.isalnum() or c == "_" else " " for c in line).split()
+def _variable(annotation: Any) -> tuple[str, Shape]:
+    return ("float", annotation.elts) if isinstance(annotation, ast.Tuple) else (ast.unparse(annotation), [])
 
 
 class CAlgorithm(AlgorithmPrinter):
     """C99; arrays start at nil in every call, and truth is an int."""
 
-    operators: ClassVar = {
-        ast.Add: " + ", ast.Sub: " - ", ast.Mult: " * ", ast.Div: " / ", ast.FloorDiv: " / ", ast.Eq: " == ",
-        ast.NotEq: " != ", ast.Lt: " < ", ast.LtE: " <= ", ast.Gt: " > ", ast.GtE: " >= ", ast.And: " && ",
-        ast.Or: " || ", ast.Not: "!", ast.USub: "-",
-    }  # fmt: skip
     forms: ClassVar = {
-        "assign": "{} = {};", "call": "{};", "return": "return {value};", "break": "break;", "if": "if ({}) {{",
-        "else if": "}} else if ({}) {{", "else": "} else {", "end if": "}", "while": "while ({}) {{", "end while": "}",
-        "for": "for ({name} = {first}; {name} < {last}; {name}++) {{", "end for": "}",
+        "end": ";", "call": "{};", "return": "return {1};", "break": "break;", "choice": "({} ? {} : {})",
+        "if": "if ({}) {{", "else if": "}} else if ({}) {{", "else": "}} else {{", "end if": "}",
+        "while": "while ({}) {{", "end while": "}", "for": "for ({0} = {1}; {0} < {2}; {0}++) {{", "end for": "}",
     }  # fmt: skip
-    functions: ClassVar = {
+    names: ClassVar = {
         "abs": "fabs", "max": "fmax", "min": "fmin", "float": "(double)", "Pow": "pow({}, {})", "Mod": "{} % {}",
     }  # fmt: skip
     kinds: ClassVar = {"float": "double", "int": "int", "bool": "int", "None": "void"}
     element: ClassVar = ("[", "][", "]")
 
-    def number(self, value: object) -> str:
+    def number(self, value: Any) -> str:
         """A number."""
         return repr(int(value) if isinstance(value, bool) else value)
-
-    def choice(self, node: ast.IfExp) -> str:
-        """The conditional operator."""
-        return f"({self.text(node.test, 1)} ? {self.text(node.body, 1)} : {self.text(node.orelse, 1)})"
 
     def comment(self, lines: Sequence[str], depth: int) -> list[str]:
         """One comment."""
         return [f"{'  ' * depth}/* " + f"\n{'  ' * depth}   ".join(line.strip() for line in lines if line) + " */"]
 
-    def framed(self, body: list[str]) -> Iterator[str]:
+    def framed(
+        self, body: list[str], arguments: Mapping[str, tuple[str, Shape]], local: Mapping[str, tuple[str, Shape]]
+    ) -> Iterator[str]:
         """Head, declarations, body."""
-        arguments = []
-        for argument in self.function.args.args:
-            brackets = "".join(f"[{self.text(n)}]" for n in self.source.shapes.get(argument.arg, ()))
-            arguments.append(f"{self.kinds.get(_kind(argument), 'double')} {argument.arg}{brackets}")
         scope = "" if self.function.name == "update" else "static "
-        yield f"{scope}{self.returned()} {self.prefix}_{self.function.name}({', '.join(arguments)})"
+        head = ", ".join(self._declared(name, *variable) for name, variable in arguments.items())
+        kind = self.kinds[ast.unparse(self.function.returns or ast.Constant(None))]
+        yield f"{scope}{kind} {self.prefix}_{self.function.name}({head})"
         yield "{"
-        for name, (kind, lengths) in self.local_variables(body).items():
-            zeros = f" = {'{' * len(lengths)}0.0{'}' * len(lengths)}" if lengths else ""
-            yield f"  {self.kinds[kind]} {name}{''.join(f'[{self.text(n)}]' for n in lengths)}{zeros};"
-        yield from body
-        yield "}"
+        for name, (kind, shape) in local.items():
+            nil = f" = {'{' * len(shape)}0.0{'}' * len(shape)}" if shape else ""
+            yield f"  {self._declared(name, kind, shape)}{nil};"
+        yield from (*body, "}")
 
-    def constants(self, names: Sequence[str]) -> list[str]:
+    def _declared(self, name: str, kind: str, shape: Shape) -> str:
+        return f"{self.kinds[kind]} {name}{''.join(f'[{self.text(n)}]' for n in shape)}"
+
+    def constants(self, names: Sequence[str]) -> Iterator[str]:
         """The constants of a file: what is a length has to be of an enumeration."""
-        values = {name: self.source.constants[name] for name in names}
-        numbers = [f"{name} = {int(value)}" for name, value in values.items() if isinstance(value, int)]
-        lines = [f"enum {{ {', '.join(numbers)} }};"]
+        values = {name: self.numbers[name] for name in names}
+        integers = [f"{name} = {int(value)}" for name, value in values.items() if isinstance(value, int)]
+        yield f"enum {{ {', '.join(integers)} }};"
         for name, value in values.items():
             if isinstance(value, tuple):
-                lines.append(f"static const double {name}[] = {{{', '.join(map(repr, value))}}};")
+                yield f"static const double {name}[] = {{{', '.join(map(repr, value))}}};"
             elif isinstance(value, float):
-                lines.append(f"static const double {name} = {value!r};")
-        return lines
+                yield f"static const double {name} = {value!r};"
 
 
 class FortranAlgorithm(AlgorithmPrinter):
     """Fixed form, all in double precision; arrays start at index 0 and at nil in every call."""
 
-    operators: ClassVar = {
-        ast.Add: " + ", ast.Sub: " - ", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Eq: " == ",
-        ast.NotEq: " /= ", ast.Lt: " < ", ast.LtE: " <= ", ast.Gt: " > ", ast.GtE: " >= ", ast.And: " .and. ",
-        ast.Or: " .or. ", ast.Not: ".not. ", ast.USub: "-", ast.Pow: "**",
+    signs: ClassVar = {
+        **_SIGNS, ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.NotEq: " /= ", ast.And: " .and. ",
+        ast.Or: " .or. ", ast.Not: ".not. ", ast.Pow: "**",
     }  # fmt: skip
     forms: ClassVar = {
-        "assign": "{} = {}", "call": "call {}", "return": "{name} = {value}\nreturn", "break": "exit",
+        "end": "", "call": "call {}", "return": "{} = {}\nreturn", "break": "exit", "choice": "merge({1}, {2}, {0})",
         "if": "if ({}) then", "else if": "elseif ({}) then", "else": "else", "end if": "endif",
-        "while": "do while ({})", "end while": "enddo", "for": "do {name} = {first}, {last} - 1", "end for": "enddo",
+        "while": "do while ({})", "end while": "enddo", "for": "do {} = {}, {} - 1", "end for": "enddo",
     }  # fmt: skip
-    functions: ClassVar = {"float": "dble", "Mod": "mod({}, {})"}
+    names: ClassVar = {"float": "dble", "Mod": "mod({}, {})"}
     kinds: ClassVar = {"float": "double precision", "int": "integer", "bool": "logical", "None": ""}
     element: ClassVar = ("(", ", ", ")")
 
-    def number(self, value: object) -> str:
+    def number(self, value: Any) -> str:
         """A number in double precision, or an integer, or a truth value."""
         if isinstance(value, bool):
             return f".{value}.".lower()
-        return str(value) if isinstance(value, int) else fortran_number(float(str(value)))
-
-    def choice(self, node: ast.IfExp) -> str:
-        """The intrinsic function, which takes both."""
-        return f"merge({self.text(node.body)}, {self.text(node.orelse)}, {self.text(node.test)})"
-
-    def operation(self, node: ast.expr, above: int) -> str:
-        """Powers are operators here."""
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            return f"{self.text(node.left, 9)}**{self.text(node.right, 9)}"
-        return super().operation(node, above)
+        return str(value) if isinstance(value, int) else fortran_number(value)
 
     def comment(self, lines: Sequence[str], depth: int) -> list[str]:
         """Lines that begin with an exclamation mark."""
         return ["!", *comment_lines([line.strip() for line in lines if line], "!", 71)]
 
-    def framed(self, body: list[str]) -> Iterator[str]:
+    def framed(
+        self, body: list[str], arguments: Mapping[str, tuple[str, Shape]], local: Mapping[str, tuple[str, Shape]]
+    ) -> Iterator[str]:
         """Head, declarations, arrays at nil, body."""
-        local = self.local_variables(body)
-        arguments = self.function.args.args
-        called = [
-            f"{kind} {self.prefix}_{name}"
-            for name, node in self.source.functions.items()
-            if (kind := self.kinds.get(ast.unparse(node.returns) if node.returns else "", ""))
-            and any(f"{self.prefix}_{name}" in _words(line) for line in body)
-            and name != self.function.name
-        ]
-        shaped = {a.arg: (_kind(a), list(self.source.shapes.get(a.arg, ()))) for a in arguments}
-        declared = [self._declaration(name, *variable) for name, variable in {**shaped, **local}.items()]
-        result = self.returned()
-        opening = f"{result} function" if result else "subroutine"
-        names = ", ".join(shaped)
+        returned = {
+            name: self.kinds[ast.unparse(node.returns)] for name, node in self.functions.items() if node.returns
+        }
+        called = {name for line in body for name in re.findall(rf"{self.prefix}_(\w+)\(", line)}
+        declared = [self._declared(name, *variable) for name, variable in {**arguments, **local}.items()]
+        declared += [f"{returned[name]} {self.prefix}_{name}" for name in sorted(called) if returned.get(name)]
+        opening = f"{returned[self.function.name]} function" if returned[self.function.name] else "subroutine"
         lines = [
-            f"{opening} {self.prefix}_{self.function.name}({names})",
+            f"{opening} {self.prefix}_{self.function.name}({', '.join(arguments)})",
             "  implicit none",
-            *(f"  {line}" for line in (*self.constants([*self.used]), *called, *declared)),
-            *(f"  {name} = 0.0d0" for name, (_, lengths) in local.items() if lengths),
+            *(f"  {line}" for line in (*self._constants(), *declared)),
+            *(f"  {name} = 0.0d0" for name, (_, shape) in local.items() if shape),
             *body,
             f"end {opening.split()[-1]}",
         ]
         yield from fortran_statements(lines)
 
-    def _declaration(self, name: str, kind: str, lengths: Sequence[ast.expr]) -> str:
-        bounds = ", ".join(f"0:{self._last(n)}" for n in lengths)
-        return f"{self.kinds.get(kind, 'double precision')} {name}{f'({bounds})' if lengths else ''}"
+    def _declared(self, name: str, kind: str, shape: Shape) -> str:
+        bounds = ", ".join(f"0:{self.text(n, 5)} - 1" for n in shape)
+        return f"{self.kinds[kind]} {name}{f'({bounds})' if shape else ''}"
 
-    def _last(self, length: ast.expr) -> str:
-        known = self.source.known(length)
-        return f"{self.text(length, 5)} - 1" if not isinstance(known, int) else str(known - 1)
-
-    def constants(self, names: Sequence[str]) -> Iterator[str]:
-        """Constants of one routine."""
-        for name in names:
-            value = self.source.constants[name]
+    def _constants(self) -> Iterator[str]:
+        for name in self.used:
+            value = self.numbers[name]
             if isinstance(value, tuple):
                 numbers = ", ".join(map(fortran_number, value))
                 yield f"double precision, parameter :: {name}(0:{len(value) - 1}) = (/ {numbers} /)"
             else:
                 kind = "integer" if isinstance(value, int) else "double precision"
-                yield f"{kind}, parameter :: {name} = {value if isinstance(value, int) else fortran_number(value)}"
+                yield f"{kind}, parameter :: {name} = {self.number(value)}"

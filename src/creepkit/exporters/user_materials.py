@@ -1,7 +1,7 @@
 """User materials of finite element codes: one stress update with its tangent, and a thin wrapper for each code.
 
-The update is that of stress_update.py, printed as C or as fixed-form Fortran beside the law; what a code calls is a
-template that puts its arguments in the update's order. A target is a record of UserMaterial.
+The update is that of templates/stress_update.txt, printed as C or as fixed-form Fortran beside the law; what a code
+calls is a template that puts its arguments in the update's order. A target is a record of UserMaterial.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from string import Template
 import sympy
 
 from creepkit.errors import ExportError
-from creepkit.exporters import stress_update
-from creepkit.exporters.algorithm_printers import Algorithm, CAlgorithm, ConstantValue, FortranAlgorithm, algorithm
+from creepkit.exporters.algorithm_printers import AlgorithmPrinter, CAlgorithm, ConstantValue, FortranAlgorithm
 from creepkit.exporters.c import (
     C_RESERVED,
     STABLE_FUNCTION_NAMES,
@@ -80,17 +79,12 @@ class UserMaterial:
         if not self.takes_conditions:
             refuse_conditions(source.law, self.name)
         in_c = self.suffix == ".c"
-        reserved = (C_RESERVED | STABLE_FUNCTION_NAMES) if in_c else FORTRAN_RESERVED
-        stems = Identifiers(
-            reserved, ignore_case=not in_c, max_length=63 if in_c else _MAX_NAME_LENGTH - _LONGEST_ENDING
-        )
-        stem = stems.unique(source.name or source.law.name)
+        reserved = C_RESERVED | STABLE_FUNCTION_NAMES | {"x", "out"} if in_c else FORTRAN_RESERVED
+        longest = 63 if in_c else _MAX_NAME_LENGTH - _LONGEST_ENDING
+        stem = Identifiers(reserved, ignore_case=not in_c, max_length=longest).unique(source.name or source.law.name)
         stem = stem if in_c else stem.lower()
-        taken = {f"{stem}_{name}" for name in vars(stress_update)} | {"x", "out", TEMPERATURE}
-        if in_c:
-            code = LawCode(source, Identifiers(reserved | taken | {*vars(stress_update)}))
-        else:
-            code = LawCode(source, Identifiers(reserved | taken, ignore_case=True, max_length=_MAX_NAME_LENGTH))
+        longest = 63 if in_c else _MAX_NAME_LENGTH
+        code = LawCode(source, Identifiers(reserved | {f"{stem}_law"}, ignore_case=not in_c, max_length=longest))
         lines = [*heading(code.source, mentions_floors=True), *code.renaming_notes(), "", *self._usage(code)]
         write = c_update if in_c else fortran_update
         return write(code, stem, lines, self._wrapper(code, stem))
@@ -151,7 +145,7 @@ def _update_notes(code: LawCode) -> Iterator[str]:
 
 
 def update_constants(code: LawCode) -> dict[str, ConstantValue]:
-    """The numbers in capitals of stress_update.py, for one law."""
+    """The numbers in capitals of the algorithm, for one law."""
     law, units = code.law, code.source.units
     states = list(law.states.values())
     ns, nc = len(states), len(code.conditions)
@@ -169,15 +163,17 @@ def update_constants(code: LawCode) -> dict[str, ConstantValue]:
         "SIDE": (1.0, *(1.0 if end > state.initial else -1.0 for end, state in zip(limits, states, strict=True))),
         "MPA": float(units.megapascals),
         "SECONDS": float(units.seconds),
-        **{name: getattr(stress_update, name) for name in ("TOLERANCE", "TICKS", "GAMMA")},
     }
 
 
-def _algorithm(code: LawCode) -> tuple[Algorithm, list[str]]:
-    """The algorithm for a law, and which of its functions are printed."""
-    source = algorithm(stress_update, update_constants(code))
-    absent = {"law", "moduli"} | (set() if code.law.uses(principal_stress) else {"largest_principal"})
-    return source, [name for name in source.functions if name not in absent]
+def _update_functions(code: LawCode, printer: AlgorithmPrinter) -> tuple[list[str], set[str]]:
+    """The functions of the update, and the constants that they use."""
+    lines, used = list[str](), set[str]()
+    for name in printer.functions:
+        if name != "largest_principal" or code.law.uses(principal_stress):
+            lines += printer.definition(name)
+            used |= {*printer.used}
+    return lines, used
 
 
 def _moduli(code: LawCode) -> dict[str, sympy.Expr]:
@@ -193,18 +189,14 @@ def _moduli(code: LawCode) -> dict[str, sympy.Expr]:
 
 def c_update(code: LawCode, stem: str, head: Iterable[str], wrapper: str) -> str:
     """The file in C99."""
-    source, names = _algorithm(code)
-    printer, used = CAlgorithm(source, stem), dict[str, None]()
-    functions = []
-    for name in names:
-        functions += printer.definition(name)
-        used |= printer.used
+    printer = CAlgorithm(_template("stress_update.txt"), update_constants(code), stem)
+    functions, used = _update_functions(code, printer)
     law = [*_c_law(code, stem), *_c_moduli(code, stem)]
     parts = [
         *c_block_comment(comment_lines(map(comment_safe, head), " *", 110)),
         "#include <math.h>",
         "",
-        *printer.constants([name for name in source.constants if name in used or name in ("NX", "NC", "NY", "NV")]),
+        *printer.constants([name for name in printer.numbers if name in used]),
         "",
         *map(c_function_definition, stable_functions_in(law)),
         *law,
@@ -243,13 +235,12 @@ def _c_moduli(code: LawCode, stem: str) -> Iterator[str]:
 
 def fortran_update(code: LawCode, stem: str, head: Iterable[str], wrapper: str) -> str:
     """The file in fixed-form Fortran."""
-    source, names = _algorithm(code)
-    printer = FortranAlgorithm(source, stem)
+    printer = FortranAlgorithm(_template("stress_update.txt"), update_constants(code), stem)
     parts = [
         *comment_lines(map(comment_safe, head), "!", 71),
         "!",
         *wrapped_lines(wrapper),
-        *(line for name in names for line in printer.definition(name)),
+        *_update_functions(code, printer)[0],
         "!",
         "! The law: ln of the rate and each internal variable's rate, 1/s,",
         "! then their derivatives to x, row by row.",
@@ -291,9 +282,9 @@ class NumpyUpdate:
         """Return the module's text; ExportError where there is no elasticity."""
         require_elasticity(source, self.name)
         dialect = array_dialect()
-        words = (*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *vars(stress_update), *_NUMPY_NAMES)
-        code = LawCode(source, Identifiers(words))
-        constants, function = update_constants(code), code.function("update")
+        code = LawCode(source, Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_NUMPY_NAMES)))
+        function = code.function("update")
+        printer = CAlgorithm(_template("stress_update.txt"), update_constants(code), "")
         inputs = {s: k for k, s in enumerate((*code.point, *code.states, *code.conditions))}
         ny, nx = 1 + len(code.states), 6 + len(code.states)
         used = {*function.symbols, *code.logarithms_used(function).values()}
@@ -322,12 +313,10 @@ class NumpyUpdate:
         )
         lines = [*heading(code.source, mentions_floors=True), *code.renaming_notes(), "", *_update_notes(code)]
         opening = ['"""A creep law\'s stress update, exported by creepkit."""', "", *comment_lines(lines, "#"), ""]
-        columns = {"INITIAL", "LIMIT", "SIDE"}
-        kept = (*columns, "PRINCIPAL", "BETA", "MPA", "SECONDS", "TOLERANCE", "TICKS", "GAMMA")
         numbers = [
             f"{name} = {f'np.array({[*value]})[:, None]' if isinstance(value, tuple) else repr(value)}"
-            for name, value in constants.items()
-            if name in kept
+            for name, value in printer.numbers.items()
+            if name not in ("NS", "NC", "NY", "NV", "NX")
         ]
         blocks = ["\n".join(part) for part in (numbers, law, moduli)]
         return "\n".join([*opening, with_helpers("\n\n\n".join([*blocks, body.strip()]), dialect)]) + "\n"
