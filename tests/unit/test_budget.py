@@ -14,16 +14,16 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 285,
+    "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2135,
+    "cli": 2149,
     "composition": 371,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2738,
+    "exporters": 2739,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
@@ -36,23 +36,23 @@ BUDGET = {
     "language": 1557,
     "law_search": 765,
     "laws": 136,
-    "modules": 747,
+    "modules": 749,
     "quality": 1143,
     "readers": 6525,
-    "records": 2392,
-    "registry": 608,
-    "reports": 6436,
+    "records": 2467,
+    "registry": 615,
+    "reports": 6459,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
     "studies": 2770,
     "surrogates": 1361,
-    "testing": 1774,
+    "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_141
+TESTS = 30_276
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
