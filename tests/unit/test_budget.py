@@ -18,7 +18,7 @@ BUDGET = {
     "app": 596,
     "cameras": 823,
     "cli": 2149,
-    "composition": 371,
+    "composition": 411,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9470,
+    "inverse": 9472,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 6525,
     "records": 2467,
     "registry": 615,
-    "reports": 6459,
+    "reports": 6471,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_276
+TESTS = 30_305
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
