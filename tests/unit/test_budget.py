@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_305
+TESTS = 30_321
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -69,6 +69,22 @@ def test_ice_has_the_softness_of_the_table() -> None:
     assert softness == pytest.approx(np.array(list(GLEN_A.values())), rel=0.04)
 
 
+FLOW_FACTORS = {
+    "ice-paterson-budd": (4.65791754e-16, 1.45114704e-14, 4.54299921e-14),
+    "ice-hooke": (5.26775897e-16, 2.12325906e-14, 5.32397091e-13),
+}
+"""test/miscellaneous.py of PISM: {material: D/s at tau = 1e5 Pa, and -30, -5 and 0 C}, 1/(Pa s)."""
+
+
+@pytest.mark.parametrize("name", FLOW_FACTORS)
+def test_ice_flows_as_pism_has_it(name: str) -> None:
+    """The gas constant of PISM is 8.31441: 2e-4 of the rate."""
+    T, tau = np.array([-30.0, -5.0, 0.0]) + CELSIUS, 0.1
+    factors = rates(name, stress=3**0.5 * tau, temperature=T) / (2.0 / 3.0 * 3**0.5 * tau * 1e6)
+
+    assert factors == pytest.approx(np.array(FLOW_FACTORS[name]), rel=1e-3)
+
+
 # ---- solder ----------------------------------------------------------------------------------------------------------
 
 SATURATION = [(25, 1e-3, 40.5), (50, 1e-3, 33.5), (100, 1e-3, 24.0), (125, 1e-3, 21.5), (25, 1e-4, 35.5)]
@@ -93,6 +109,7 @@ def test_sac305_flows_at_the_stress_of_the_figure(C: float, rate: float, printed
 
 FUEL = {"density": 95.0, "grain_size": 10.0, "fission_rate": 1.0}
 AGED = {"fast_flux": 0.0, "fast_fluence": 5.0}
+WET = {"pressure": 1000.0, "hydrogen": 0.01 / 0.01801528 / (0.99 / 0.1470027) * 1e6}
 
 PRINTED = [
     # docs/theory/correlations.rst of dualmesh: "check values"
@@ -104,6 +121,14 @@ PRINTED = [
     ("zircaloy-4", {"stress": 100.0, "temperature": 620.0, **AGED}, 6.19516e-11, 1e-4),
     ("zircaloy-4", {"stress": 100.0, "temperature": 720.0, **AGED}, 1.31040e-8, 1e-4),
     ("zircaloy-4", {"stress": 100.0, "temperature": 620.0, "fast_flux": 1.0, "fast_fluence": 5.0}, 2.59095e-10, 1e-4),
+    # test_fecral_correlations_are_those_of_the_handbook of dualmesh: 4.5e-11, and by heat four decades less
+    ("fecral", {"stress": 100.0, "temperature": 600.0, "fast_flux": 1.0}, 4.5e-11, 1e-3),
+    # docs/theory/triso.rst of dualmesh: K = 2.72e-4 at 1000 C, for 1e25 n/m^2
+    ("pyrocarbon", {"stress": 1.0, "temperature": 1273.15, "fast_flux": 1.0}, 2.72e-4 * 1e-7, 3e-3),
+    # heads of tests/*.prm of ASPECT: stress = 2 viscosity rate, and two rates at a stress
+    ("olivine-wet", {"stress": 2 * 1.00291e13 * 1e-13, "temperature": 1173.0, **WET}, 1e-13, 1e-3),
+    ("olivine-mei", {"stress": 1000.0, "temperature": 1073.0}, 9.576747017313619e-11, 2e-3),
+    ("olivine-idrissi", {"stress": 109.2890, "temperature": 1073.0}, 1.000000e-13, 4e-3),
     # test/test_DislocationCreep.jl and test/test_DiffusionCreep.jl of GeoParams.jl, without tensor correction
     ("olivine", {"stress": 0.3, "temperature": 1673.0}, 4.612967949163285e-14, 1e-3),
     ("anorthite", {"stress": 1.0, "temperature": 923.15, "grain_size": 5000.0}, 9.451777858730959e-26, 1e-3),
