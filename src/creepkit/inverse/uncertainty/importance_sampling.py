@@ -200,7 +200,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
         return None
     for k, points in enumerate(JUDGED_POINTS):
         residuals, rate_effect, *slopes = (posterior.residuals if k else posterior.residuals_and_jacobian)(judged)
-        exact = posterior.log_density(residuals, rate_effect)
+        exact = posterior.log_density(judged, residuals, rate_effect)
         if k and float(np.std(exact - density(judged))) < LARGEST_ERROR:
             return samples
         usable = np.isfinite(exact) & np.isfinite(residuals).all((1, 2))
@@ -219,7 +219,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
             return None
         samples, judged = found, found[:: len(found) // points][:points]
     further, further_effect = posterior.residuals(judged)
-    errors = posterior.log_density(further, further_effect) - density(judged)
+    errors = posterior.log_density(judged, further, further_effect) - density(judged)
     return _resampled(judged, errors, LEAST_EFFECTIVE_SIZE, SAMPLES)
 
 
