@@ -41,7 +41,8 @@ from creepkit.records import Predictor
 from creepkit.records.presentable import Presentable, Tabulated
 
 ROUNDS, MOST_ROUNDS = 4, 12
-"""Of proposals: at least, and where the samples are still worth too few."""
+"""Of proposals: at least, to which those end whose density takes predictions where nobody asked for samples; and where
+the samples are still worth too few."""
 
 
 DRAWS, MOST_DRAWS = 256, 4096
@@ -95,7 +96,8 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     posterior = Posterior.from_identification(replace(fit, problem=problem))
     centre, seed, shape = np.array(fit.u), fit.settings.seed, _first_shape(fit, posterior)
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
-    samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
+    if samples is None:
+        samples = posterior_samples(posterior, centre, shape, seed, rounds=ROUNDS)
     if samples is None:
         return replace(fit, notes=(*fit.notes, NOT_SAMPLED))
     return replace(fit, samples=samples)
@@ -268,18 +270,19 @@ def posterior_samples(
     *,
     draws: int = SAMPLES,
     least: float = LEAST_EFFECTIVE_SIZE,
+    rounds: int = MOST_ROUNDS,
 ) -> Floats | None:
     """(draws, parameters) conditioned coordinates of equal weight; None where too few of those tried count.
 
     density : ln p (candidates,), but for a constant, of u (candidates, parameters).
     centre : (parameters,) of the first proposal. shape : (parameters, parameters) its covariance. least : effective
-    number of draws at which it ends.
+    number of draws at which it ends. rounds : at most.
     """
     size = centre.size
     smallest = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
-    for k in range(MOST_ROUNDS):
+    for k in range(rounds):
         proposals.append((centre, shape))
         drawn = _drawn(centre, shape, seed + k)
         points = np.concatenate([points, drawn])
