@@ -28,7 +28,6 @@ from creepkit.errors import FitError
 from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.observation_series import ObservationSeries
 
-
 ABSOLUTE_JITTER, RELATIVE_JITTER = 1e-10, 1e-9
 """Of variances, as in src/core/noise_likelihood.hpp."""
 
