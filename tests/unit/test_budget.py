@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9472,
+    "inverse": 9510,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_321
+TESTS = 30_344
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
