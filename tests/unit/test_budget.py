@@ -47,12 +47,12 @@ BUDGET = {
     "screening": 572,
     "specimens": 3203,
     "studies": 2770,
-    "surrogates": 1361,
+    "surrogates": 1384,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_361
+TESTS = 30_388
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
