@@ -179,3 +179,23 @@ def test_viscosity_of_gerya_s_olivine_is_that_of_his_exercise() -> None:
     stress = (2 / 3**0.5 * 1e-14 / rates("olivine-gerya", stress=1.0, temperature=T)) ** (1 / 3.5)
 
     assert np.mean(1e6 * stress / 3**0.5 / 2e-14) == pytest.approx(4.124658696991946e24, rel=1e-3)
+
+
+STRAINS = [
+    # material, point, MPa of Young, Poisson, days, 2-norm of the tensor of strain
+    ("rock-salt", {"stress": 1.0, "temperature": 298.15, "grain_size": 5e4}, 25e3, 0.25, 2.0, 4.2636355248e-05),
+    ("rock-salt-bgra", {"stress": 20.0, "temperature": 273.15}, 25e3, 0.27, 20.0, 1.5102310554e-3),
+]
+"""RangeMax of epsilon in uniax_compression_ts_2_t_2.000000.vtu and m2_1Dcreep_ts_400_t_20.000000.vtu of ogs."""
+
+
+@pytest.mark.parametrize(("name", "point", "young", "poisson", "days", "printed"), STRAINS)
+def test_salt_is_strained_as_ogs_has_it(
+    name: str, point: dict[str, float], young: float, poisson: float, days: float, printed: float
+) -> None:
+    elastic, creep = point["stress"] / young, float(rates(name, **point)) * days * 86400.0
+
+    def norm(creep: float) -> float:
+        return float(np.hypot(elastic + creep, 2**0.5 * (poisson * elastic + creep / 2)))
+
+    assert norm(creep) - norm(0.0) == pytest.approx(printed - norm(0.0), rel=1e-3)
