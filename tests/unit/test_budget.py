@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_388
+TESTS = 30_401
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
