@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
+from creepkit.exporters.exporting import input_of_programs
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.nuisance_parameters import beyond_intervals, combined_change_text
@@ -37,13 +38,29 @@ from creepkit.reports.blocks import (
     plural,
     printable,
 )
-from creepkit.reports.description import headline_role, rejected, tested_range, tests_text
+from creepkit.reports.description import headline_role, mean_misfit_text, rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 from creepkit.reports.verdicts import cause_caution, cause_headline, same_functions, unmet_text, verdict_text
-from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, NEW_TEST, REASONS
+from creepkit.reports.words import (
+    BRACKETS,
+    CAUTIONS,
+    CODES,
+    CONSTANT_LOAD,
+    DESIGN,
+    FORECAST,
+    IN_EACH_TEST,
+    MEAN_SLOPE,
+    MORE_CODES,
+    NEW_TEST,
+    ONE_ALONE,
+    OTHER_N,
+    OVER_ALL_TESTS,
+    REASONS,
+)
 
 if TYPE_CHECKING:
+    from creepkit.experiments.planned_design import Design
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
     from creepkit.inverse.adequacy import Adequacy
@@ -117,7 +134,7 @@ class KeyFigure:
     def text(self) -> str:
         """Value, interval and unit; of an exponent or energy whose interval is wider than itself the interval alone."""
         said = interval_text((self.value, self.low, self.high), self.unit)
-        if not (self.name.endswith(SLOPES) and self.high - self.low > self.value):
+        if not (self.name in SLOPES and self.high - self.low > self.value):
             return said
         return (
             f"{NOT_DETERMINED} [{number(max(self.low, 0.0), 2)}, {number(self.high, 2)}]{self.unit and ' '}{self.unit}"
@@ -126,7 +143,7 @@ class KeyFigure:
 
 def _written_out(value: float, digits: int) -> str:
     """A number without a power of ten where it has a usual size, such as 2930 h."""
-    if not 1e3 <= abs(value) < 1e6:
+    if not 10.0**digits <= abs(value) < 1e6:
         return number(value, digits)
     return f"{float(f'{value:.{digits}g}'):.0f}"
 
@@ -140,11 +157,12 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
     (measured, half, predicted), (heat, error, _) = slopes
     of_heat = (heat, heat - error, heat + error)
-    by_rates = _with_interval("measured activation energy", tested_range(fit), of_heat, 1e-3, "kJ/mol")
+    where = f"{OVER_ALL_TESTS}, {tested_range(fit)}"
+    by_rates = _with_interval("activation energy", where, of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), *_lives(fit)]
+        found = [KeyFigure("stress exponent", where, *interval, remark=by_law), *_lives(fit)]
         return [one for one in (*found, by_rates) if math.isfinite(one.value)]
     r = fit.tested_point
     of_state = ""
@@ -152,10 +170,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    by_tests = f"{measured:.2g} over all tests" if math.isfinite(measured) else ""
+    by_tests = MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{by_rates.text} over all tests" if math.isfinite(heat) else ""
+        by_tests = MEAN_SLOPE.format(value=by_rates.text) if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
@@ -378,11 +396,16 @@ def _precision(fit: Identification) -> Iterator[str]:
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected(fit) and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
-    change = combined_change_text(fit.unmodelled)
-    if change:
-        kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield CAUTIONS["not included"].format(kinds=kinds, change=change)
+        side = "larger" if far.exponent > exponent else "smaller"
+        per_cent = f"{100 * abs(far.exponent / exponent - 1):.2g} %"
+        yield CAUTIONS["one test"].format(test=_test(fit, far.test), change=per_cent, side=side)
+    if change := combined_change_text(fit.unmodelled):
+        left_out = beyond_intervals(fit.unmodelled)
+        kinds = " and ".join(dict.fromkeys(one.description for one in left_out[:2]))
+        kinds += IN_EACH_TEST * (left_out[0].tests > 1)
+        single = max((one.test_change_text for one in left_out if one.tests > 1), default="")
+        alone = ONE_ALONE.format(change=single) if single else ""
+        yield CAUTIONS["not included"].format(kinds=kinds, change=change, alone=alone)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:
@@ -401,30 +424,31 @@ def answer(
     asked: Sequence[KeyFigure] = (),
     quality: DataQuality | None = None,
     searched: Sequence[str] = (),
+    design: Design | None = None,
     **page: Any,
 ) -> Answer:
     """Headline, equations, values, key figures, cautions and what to do next, of the best law of a ranking if given.
 
-    asked : what forecasts say. quality : of the data. searched : names of laws that a search of laws tried. page :
-    picture and files.
+    asked : what forecasts say. quality : of the data. searched : names of laws that a search of laws tried. design : of
+    further tests, whose first is what to do next. page : picture and files.
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
     remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), same_functions(ranking)]
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
-    exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
-    other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
+    exponent = next((one.value for one in figures if one.name == "stress exponent"), math.nan)
+    other = OTHER_N * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     figures = [*asked[:MOST_ASKED], *figures]
     return Answer(
         fit.headline,
-        tests_text(fit),
+        "; ".join(filter(None, (tests_text(fit), mean_misfit_text(fit)))),
         titled_law(fit.law),
         equations(fit.law),
         [(symbols[e.name], *_shown_value(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
         [(one.name, one.where, one.text, one.remark) for one in figures],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
-        next_step(fit, ranking, searched),
+        next_step(fit, ranking, searched) if design is None or not design.plan else planned_text(design),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
         role=headline_role(fit),
@@ -433,11 +457,23 @@ def answer(
     )
 
 
-def answer_text(
-    fit: Identification, ranking: Ranking | None = None, more: object = ".details()", searched: Sequence[str] = ()
-) -> str:
-    """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest."""
-    return as_text([answer(fit, ranking, more=str(more), searched=searched)])
+def planned_text(design: Design) -> str:
+    """The tests of a design as what to do next."""
+    return design.sentence.removeprefix(DESIGN["test"].partition("{")[0])
+
+
+def codes_text(fit: Identification) -> str:
+    """The law's keyword, or the routine that it needs, in finite element codes; "" where none takes it."""
+    found = [f"{program}: {line}" for program, line in input_of_programs(fit).items()]
+    return f"{CODES.format(codes='; '.join(found))} ({MORE_CODES})" if found else ""
+
+
+def answer_text(fit: Identification, ranking: Ranking | None = None, more: object = ".details()", **known: Any) -> str:
+    """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest.
+
+    known : laws that were searched, and a design, see answer().
+    """
+    return as_text([answer(fit, ranking, more=str(more), **known)])
 
 
 def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) -> Table:
@@ -447,13 +483,13 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
     """
     rows: list[Sequence[Cell]] = []
     for name, (fit, decisive) in groups.items():
-        figures = {one.name.removeprefix("measured "): one.text for one in key_figures(fit)}
+        figures = {one.name: one.text for one in key_figures(fit)}
         choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
         rate, stress = figures.get("creep rate", "–").replace(" %/h", ""), number(fit.tested_point.stress, 3)
         numbers = (figures.get("stress exponent", "–"), rate, stress)
         rows.append((name, titled_law(fit.law), *numbers, f"{verdict_text(fit.adequacy)}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
-    caption = "in brackets: 95 % intervals; of a law that the tests reject the measured stress exponent, and no rate"
+    caption = "in brackets: 95 % intervals; of a law that the tests reject the slope of measured rates, and no rate"
     return Table(caption, columns, rows)
 
 
@@ -492,10 +528,11 @@ def symbols_of(law: CreepLaw) -> dict[str, Rich]:
 
 def _shown_value(law: CreepLaw, estimate: Estimate) -> tuple[str, tuple[str, str]]:
     """A value and the ends of its interval, with the digits that this leaves, or that the tests do not determine it."""
-    fewest = FEWEST_DIGITS - (estimate.verdict in (NOT_DETERMINED, POORLY_DETERMINED))
-    digits = min(interval_digits(estimate.value, estimate.low, estimate.high, fewest=fewest), MOST_SHOWN)
-    said = NOT_DETERMINED if estimate.verdict == NOT_DETERMINED else f"= {number(estimate.value, digits)}"
-    return said, interval_ends(law, estimate, digits)
+    digits = FEWEST_DIGITS - 1
+    if estimate.verdict not in (NOT_DETERMINED, POORLY_DETERMINED):
+        digits = min(interval_digits(estimate.value, estimate.low, estimate.high), MOST_SHOWN)
+    said = NOT_DETERMINED if estimate.verdict == NOT_DETERMINED else f"= {_written_out(estimate.value, digits)}"
+    return said, interval_ends(law, estimate, lambda end: _written_out(end, digits))
 
 
 def value_cells(law: CreepLaw, estimate: Estimate, held: str = "") -> dict[str, str]:
@@ -550,7 +587,7 @@ def held_quantities(fit: Identification) -> str:
 
 
 def reference_sentences(fit: Identification) -> list[str]:
-    """Where the rate amid the tests is taken, and the exponent of the law's formula where that is another."""
+    """Where the rate amid the tests is taken, and the slope of the law's formula where that is another."""
     r, state, held = fit.tested_point, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
@@ -559,8 +596,8 @@ def reference_sentences(fit: Identification) -> list[str]:
         lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
     if held and (held != "strain" or state is None):
         formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
-        lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
-        lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
+        lines.append(f"at constant {held} the slope of the law's formula over stress is {formula}")
+        lines += [] if held == "strain" else ["tests compared at one strain show another slope"]
     return lines
 
 
