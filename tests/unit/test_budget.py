@@ -18,7 +18,7 @@ BUDGET = {
     "app": 596,
     "cameras": 823,
     "cli": 2137,
-    "composition": 371,
+    "composition": 375,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_176
+TESTS = 30_179
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -116,6 +117,11 @@ class CompositionMap(Presentable, Plotted, Tabulated):
             for element, x, a, b in zip(self.elements, contents, low, high, strict=True)
             if not a - 0.1 <= 100 * x <= b + 0.1
         )
+
+    @cached_property
+    def proposals(self) -> tuple[PredictedAlloy, ...]:
+        """Those of propose() for the lowest rate, as answers show them."""
+        return self.propose()
 
     @checked
     def propose(

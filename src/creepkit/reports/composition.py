@@ -60,8 +60,7 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
         f"that the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
         f"nearly, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
     ]
-    proposals = mapped.propose()
-    lowest = min(one.rate[0] for one in proposals)
+    lowest = min(one.rate[0] for one in mapped.proposals)
     beyond = "these rates are below all that were measured: an extrapolation that only a test can confirm"
     lines += [f"left out: {name}: {why}" for name, why in mapped.left_out.items()]
     title = f"Creep rate over compositions{of}"
@@ -70,7 +69,7 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
         *([] if figures is None else [figures.picture(lambda: composition_figure(mapped), title, description, title)]),
         Items(lines),
         *_shared_blocks(mapped),
-        proposals_table(proposals, "the compositions to make next for the lowest creep rate"),
+        proposals_table(mapped.proposals, "the compositions to make next for the lowest creep rate"),
         *([Paragraph(beyond)] if lowest < float(np.exp(rate.values.min())) else []),
     ]
 
@@ -160,7 +159,7 @@ def draw_map(axes: Axes, mapped: CompositionMap) -> None:
         across, up = (own[of_law] @ CORNERS).T
         axes.scatter(across, up, c=of_alloys[of_law], s=42, marker=marker, edgecolors="white", zorder=3, **colours)
         axes.scatter([], [], marker=marker, color="0.5", label=name)
-    made = np.array([[one.composition[mapped.elements[k]] for k in shown] for one in mapped.propose()])
+    made = np.array([[one.composition[mapped.elements[k]] for k in shown] for one in mapped.proposals])
     place = made / np.maximum(made.sum(axis=1, keepdims=True), 1e-9) @ CORNERS
     across, up = place.T
     axes.scatter(across, up, marker="*", s=130, color="crimson", edgecolors="white", label="to make next", zorder=4)

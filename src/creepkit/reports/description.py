@@ -86,7 +86,7 @@ def spread_text(spread: float) -> str:
 
 
 @dataclass(frozen=True)
-class NewTest:
+class NewTestInterval:
     """How far one new test may lie from the law, amid the conditions of those that were made.
 
     quantity : "life" where lives were measured, else "rate". level : "heat" or "laboratory" of which it is another one,
@@ -99,7 +99,7 @@ class NewTest:
     half_width: float
 
     @classmethod
-    def of(cls, fit: Identification) -> NewTest | None:
+    def of(cls, fit: Identification) -> NewTestInterval | None:
         """That of an identification; None of so few tests that they do not show how they scatter."""
         scatter = fit.rate_scatter
         if scatter is None or len(scatter.tests) < MINIMUM_TESTS or scatter.stresses.size != len(scatter.tests):
@@ -128,7 +128,7 @@ def headline(fit: Identification) -> str:
     """Where the law is to be used, how far a new test may lie from it, then whether it could be the true one."""
     items = Description.of(fit).items()
     bad = _said(MISSES, _usable(items, False))
-    new = NewTest.of(fit)
+    new = NewTestInterval.of(fit)
     values = {
         "law": fit.law.name,
         "range": tested_range(fit),
@@ -142,7 +142,7 @@ def headline(fit: Identification) -> str:
 
 def mean_misfit_text(fit: Identification) -> str:
     """The mean misfit of the tests that were fitted, where the headline says instead how far a new one may lie."""
-    usable = headline_kind(fit) in ("use", "use only", "use in part") and NewTest.of(fit) is not None
+    usable = headline_kind(fit) in ("use", "use only", "use in part") and NewTestInterval.of(fit) is not None
     items = ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(fit).items())
     return MEAN_MISFIT.format(misfits=items) if usable else ""
 

@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.reports.answer import codes_text, table_of_groups
-from creepkit.reports.description import NewTest
+from creepkit.reports.description import NewTestInterval
 from creepkit.reports.next_steps import LACKING, further_test, law_to_try, next_step
 from creepkit.reports.words import NEXT
 
@@ -59,11 +59,11 @@ def test_two_power_laws_that_cross_amid_the_tests_are_told_apart_at_their_end_an
 def test_a_new_test_lies_as_far_from_the_law_as_a_regression_predicts(steady):
     """ln rate over ln stress by four tests whose rates scatter by 0.2: 0.04 (1 + leverage), 1/2 in the mean."""
     fit = ck.identify("norton", bars(), nuisances=[ck.Nuisance("rate", sd=0.2)], usual_errors="none")
-    new = NewTest.of(fit)
+    new = NewTestInterval.of(fit)
     assert (new.quantity, new.level) == ("rate", "test")
     assert new.half_width == pytest.approx(1.96 * 0.2 * np.sqrt(1.5), rel=0.02)
     assert f"a new test's rate within a factor of {np.exp(new.half_width):.3g} (95 %)" in fit.headline
-    assert NewTest.of(ck.identify("norton", bars()[:2])) is None  # which do not show how rates scatter
+    assert NewTestInterval.of(ck.identify("norton", bars()[:2])) is None  # which do not show how rates scatter
 
 
 def test_what_is_to_be_done_names_one_test_with_its_stress_temperature_and_time(steady):
