@@ -43,8 +43,9 @@ def export(
     """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
-        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have notes, and a name for the target, as well.
+        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or a
+        material, whose range and source become comments, or the record of law_with_values(), which may have notes, and
+        a name for the target, as well.
     target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
         Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
@@ -58,7 +59,8 @@ def export(
     if units is not None:
         record = record.replace(units=_units(units))
     if temperature is not None:
-        record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
+        taken = (f"taken at a temperature of {temperature:g} K", record.caution(temperature=temperature))
+        record = record.replace(notes=(*record.notes, *filter(None, taken))).at(temperature)
     text = exported_text(exporter, record)
     if to is not None:
         write_text(text, Path(to), ExportError, force=force)

@@ -56,6 +56,7 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
     lines = [
         f"rates are compared at {at}; by an alloy's own tests they are known to a factor of {np.exp(noise):.2f}",
         f"stress exponents of alloys left out are predicted within {exponent.left_out_error:.2g}",
+        *_energy_lines(mapped),
         f"{round(rate.left_out_coverage * len(rate.values))} of {len(rate.values)} rates lie in the 95 % intervals "
         f"that the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
         f"nearly, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
@@ -72,6 +73,16 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
         proposals_table(mapped.proposals, "the compositions to make next for the lowest creep rate"),
         *([Paragraph(beyond)] if lowest < float(np.exp(rate.values.min())) else []),
     ]
+
+
+def _energy_lines(mapped: CompositionMap) -> list[str]:
+    """How well activation energies of alloys left out are predicted, and over which range they are."""
+    energy = mapped.activation_energy
+    if energy is None:
+        return []
+    low, high = (number(float(one) / 1e3, 3) for one in (energy.values.min(), energy.values.max()))
+    error = number(energy.left_out_error / 1e3, 2)
+    return [f"activation energies, {low} to {high} kJ/mol, of alloys left out are predicted within {error} kJ/mol"]
 
 
 def formula_text(regression: CompositionRegression) -> str:
@@ -113,8 +124,11 @@ def proposals_table(proposals: Sequence[PredictedAlloy], caption: str) -> Table:
         contents = " ".join(f"{element}{content:.3g}" for element, content in one.composition.items() if content > 0.05)
         value, low, high = (number(PERCENT_PER_HOUR * rate, 2) for rate in one.rate)
         law, share = max(one.laws.items(), key=lambda pair: pair[1])
-        rows.append((contents, f"{value} [{low}, {high}]", f"{one.stress_exponent[0]:.2g}", f"{law} ({share:.2f})"))
-    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", "law"), rows)
+        energy = [] if one.activation_energy is None else [number(one.activation_energy[0] / 1e3, 3)]
+        exponent = f"{one.stress_exponent[0]:.2g}"
+        rows.append((contents, f"{value} [{low}, {high}]", exponent, *energy, f"{law} ({share:.2f})"))
+    energy = ["activation energy, kJ/mol"] if proposals and proposals[0].activation_energy else []
+    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", *energy, "law"), rows)
 
 
 def composition_figure(mapped: CompositionMap) -> Figure:
