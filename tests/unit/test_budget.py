@@ -18,7 +18,7 @@ BUDGET = {
     "app": 596,
     "cameras": 823,
     "cli": 2151,
-    "composition": 414,
+    "composition": 411,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,

@@ -147,11 +147,6 @@ class CompositionMap(Presentable, Plotted, Tabulated):
             if not a - 0.1 <= 100 * x <= b + 0.1
         )
 
-    @cached_property
-    def proposals(self) -> tuple[PredictedAlloy, ...]:
-        """Those of propose() for the lowest rate, as answers show them."""
-        return self.propose()
-
     @checked
     def propose(
         self,

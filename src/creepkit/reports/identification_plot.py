@@ -58,7 +58,7 @@ LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), np.array([(2.0, -3.0), (-9.0, 
 
 
 LABEL_CLEAR, LABEL_STEP = 4.0, 8
-"""Points that it is clear of other curves, beyond which further away is no better, and of labels; between places tried."""
+"""Points that it is clear of others and of curves, beyond which further is no better; and between places tried."""
 
 
 MOST_LABELLED = 16
