@@ -11,7 +11,8 @@ repeated; a fifth of them is for validation); bf16 is torch's autocast. float32 
 TF32 inside cuDNN's recurrent layers. Evaluation: the validation rows after a training, by torch on the device of the
 training, and by NumPy in double precision on one core. Prediction: 300 candidates in one test by NumPy, in double and
 in single precision, and the largest difference between these as a share of the largest output. Losses: Eq. (4) of the
-validation rows, of the first network, with one frame in `--every`, for a batch and a rate at the beginning.
+validation rows, of the first network, with one frame in `--every`, for a batch and a rate at the beginning; one
+training each, so that a few per cent between two of them say nothing.
 """
 
 import time
