@@ -17,20 +17,20 @@ BUDGET = {
     "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2149,
+    "cli": 2151,
     "composition": 411,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2739,
+    "exporters": 2763,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9510,
+    "inverse": 9514,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,18 +41,18 @@ BUDGET = {
     "readers": 6525,
     "records": 2467,
     "registry": 615,
-    "reports": 6471,
+    "reports": 6564,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2770,
+    "studies": 2785,
     "surrogates": 1391,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_378
+TESTS = 30_446
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
