@@ -78,6 +78,7 @@ BENCHMARKS = {
     "forecast_measured": Benchmark(12, needs=DATA),
     "causes": Benchmark(5, (("--campaigns", "20"),)),
     "forecast_beyond": Benchmark(4, (("--campaigns", "20"),), short=("--campaigns", "1", "--truths", "sinh")),
+    "network_training": Benchmark(60, (("--networks", "128x3", "--precisions", "float32", "--samples", "2560"),)),
     "usual_errors": Benchmark(8, (("--campaigns", "20"),)),
     "noise_correlation": Benchmark(4),
     "conditions": Benchmark(30),
