@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9510,
+    "inverse": 9397,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 6525,
     "records": 2467,
     "registry": 615,
-    "reports": 6471,
+    "reports": 6595,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_328
+TESTS = 30_331
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

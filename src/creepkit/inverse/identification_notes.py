@@ -159,16 +159,6 @@ def identification_notes(estimation: EstimationResult, nuisances: Sequence[Nuisa
     return tuple(sentences)
 
 
-def one_end_note(minima: Mapping[str, int]) -> tuple[str, ...]:
-    """That a search had one start alone, if it had.
-
-    minima : see inverse.search.multistart.
-    """
-    if minima.get("search_ends") != 1:
-        return ()
-    return ("the search ended once: whether another minimum is lower was not examined (raise starts)",)
-
-
 def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
     """Tests of which nothing is predicted, and those outside what a surrogate was trained on, a sentence each."""
     sentences = []

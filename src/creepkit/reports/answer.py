@@ -16,7 +16,7 @@ from markupsafe import Markup
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
-from creepkit.inverse.nuisance_parameters import beyond_intervals, combined_change_text
+from creepkit.inverse.nuisance_parameters import beyond_intervals
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
@@ -40,6 +40,7 @@ from creepkit.reports.blocks import (
 from creepkit.reports.description import headline_role, rejected, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
+from creepkit.reports.remarks import challenge_text, combined_change_text, nuisance_text
 from creepkit.reports.verdicts import cause_caution, cause_headline, same_functions, unmet_text, verdict_text
 from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, NEW_TEST, REASONS
 
@@ -327,7 +328,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield cause_caution(adequacy.mentioned)
     if adequacy.remedies and not adequacy.explanations:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
-    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
+    yield from (CAUTIONS["implausible"].format(nuisance=nuisance_text(one)) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
         yield CAUTIONS["noise unknown"]
 
@@ -363,7 +364,7 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
     if others:
         yield CAUTIONS["undecided"].format(laws=named(others, "law"))
     same = f"{ranking.best.law.name} above "  # a threshold
-    yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
+    yield from (challenge_text(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
         yield from (unmet_text(ranking, name) for name in ("weight", "challenges") if name in ranking.unmet)
 
