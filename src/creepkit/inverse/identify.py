@@ -363,7 +363,8 @@ def _reported(
     """Noise model, intervals, judgement and goodness of fit, all at the reported values."""
     estimator = _working_estimator(found.problem, numerical_error)
     best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
-    problem, linear, x = best.problem.with_simulated_stresses(best.x), best.linear, best.x
+    linear, x, stresses = best.linear, best.x, best.problem.simulated_stresses(best.x)
+    problem = best.problem.with_stresses(stresses)
     noise_model = estimator.final(linear, best.noise, problem.parameter_count)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
@@ -424,7 +425,7 @@ def _reported(
         effective_frames=effective_sample_size(residuals, noise_model),
         freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
-        ranges=fitted_ranges(problem, {e.name: e.value for e in estimates}),
+        ranges=fitted_ranges(problem, stresses),
         settings=problem.settings,
         provenance={**provenance_of(problem, search_outcome.evaluations), **search_outcome.minima},
         errors=pooled_errors(histories, prediction, tests),

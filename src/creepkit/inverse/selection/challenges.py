@@ -250,6 +250,11 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3, gain=1e-3)
 
 
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
+"""Of the best law, from which excesses count."""
+
+
+ALTERED_STEPS = replace(LAST_STEPS, gain=1e-3)
+"""Of altered laws, whose valleys are long: of a step that promises a thousandth of chi-square the promise is enough."""
 
 
 FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
@@ -480,7 +485,7 @@ def _least_excess(
 
     It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    least, last = best.problem.chi_square(best.x), LAST_STEPS
+    least, last = best.problem.chi_square(best.x), ALTERED_STEPS
     if best.reduced is not None:
         cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
         found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
@@ -488,5 +493,5 @@ def _least_excess(
         if found.converged and excess > FAR_EXCLUDED:
             return excess, x
         last = replace(last, wanted=0.5 * (least + EXCLUDED_BY_STEP))
-    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=last).x
-    return problem.chi_square(x) - least, x
+    end = problem.minimise(x, additional=share, fixed=fixed, tolerances=last)
+    return problem.chi_square(end.x) - 2.0 * (end.cost - end.promised) - least, end.x
