@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9397,
+    "inverse": 9399,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -47,12 +47,12 @@ BUDGET = {
     "screening": 572,
     "specimens": 3203,
     "studies": 2770,
-    "surrogates": 1361,
+    "surrogates": 1384,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_331
+TESTS = 30_404
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -1,11 +1,14 @@
-"""Rocks of mantle and crust by dislocation and diffusion creep, in axial compression at no pressure.
+"""Rocks of mantle and crust by dislocation and diffusion creep, in axial compression at no pressure but where stated.
 
 The sources print A per MPa^n and s for exp(-(E + P V)/(R T)); here P = 0, and A is brought to T_REF. Stress and rate
-are those of the tests, a difference of principal stresses and an axial rate, which are von Mises' here.
+are those of the tests, a difference of principal stresses and an axial rate, which are von Mises' here. Water enters by
+its fugacity, which the content of hydrogen states.
 """
 
+import sympy
+
 from creepkit.hookspecs import hookimpl
-from creepkit.language import CreepLaw, Param, arrhenius, conditions, parameters, stress
+from creepkit.language import GAS_CONSTANT, CreepLaw, Param, arrhenius, conditions, parameters, stress, temperature
 from creepkit.records import Material
 from creepkit_materials.forms import at_reference, norton_arrhenius
 
@@ -29,10 +32,48 @@ GRAIN_SIZE_POWER_LAW = CreepLaw(
     references=("Hirth and Kohlstedt (2003), Geophysical Monograph 138, 83",),
 )
 
-HIRTH = "Hirth and Kohlstedt (2003), Rheology of the Upper Mantle and the Mantle Wedge, Geophysical Monograph 138, 83"
-RYBACKI = (
-    "Rybacki, Gottschalk, Wirth and Dresen (2006), J. Geophys. Res. 111, B03203, Table 5, doi:10.1029/2005JB003663"
+A_w, r, Q_w, V, A_p, Q_p, stress_p, p_1, q = parameters("A_w r Q_w V A_p Q_p stress_p p_1 q")
+(pressure,) = conditions("pressure", unit="MPa")
+(hydrogen,) = conditions("hydrogen", unit="H/1e6 Si")
+
+# 26 H/1e6 Si are in equilibrium with 1 MPa at infinite temperature; 40 kJ/mol and 10 cm^3/mol are of the solution.
+fugacity = hydrogen / 26 * sympy.exp((40e3 + 10 * pressure) / (GAS_CONSTANT * temperature))
+
+WET = CreepLaw(
+    name="wet-power-law",
+    title="power law of stress and water fugacity",
+    terms={
+        "dislocations": A_w * stress**n * fugacity**r * sympy.exp(-(Q_w + pressure * V) / (GAS_CONSTANT * temperature))
+    },
+    params={
+        A_w: Param("rate coefficient", unit="1/s", bounds=(1e-10, 1e20), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(1, 8)),
+        r: Param("exponent of fugacity", bounds=(0, 3), off=0.0),
+        Q_w: Param("activation energy", unit="J/mol", bounds=(1e5, 9e5)),
+        V: Param("activation volume", unit="cm^3/mol", bounds=(0, 40)),
+    },
+    references=("Hirth and Kohlstedt (2003), Geophysical Monograph 138, 83",),
 )
+
+obstacle = sympy.Max(1 - (stress / stress_p) ** p_1, 0)
+
+PEIERLS = CreepLaw(
+    name="peierls",
+    title="dislocation glide over the lattice resistance",
+    terms={"glide": A_p * stress**n * sympy.exp(-Q_p * obstacle**q / (GAS_CONSTANT * temperature))},
+    params={
+        A_p: Param("rate coefficient", unit="1/s", bounds=(1e-12, 1e15), scale="log", off=0.0, widens=True),
+        n: Param("stress exponent", bounds=(0, 5), off=0.0),
+        Q_p: Param("activation energy at no stress", unit="J/mol", bounds=(5e4, 9e5)),
+        stress_p: Param("Peierls stress", unit="MPa", bounds=(1e2, 2e4), scale="log"),
+        p_1: Param("inner exponent of the obstacle", bounds=(0.3, 1.0)),
+        q: Param("outer exponent of the obstacle", bounds=(1.0, 2.0)),
+    },
+    references=("Mei et al. (2010)", "Idrissi et al. (2016)"),
+)
+
+HIRTH = "Hirth and Kohlstedt (2003), Rheology of the Upper Mantle and the Mantle Wedge, Geophysical Monograph 138, 83"
+RYBACKI = "Rybacki, Gottschalk, Wirth and Dresen (2006), J. Geophys. Res. 111 (B3), Table 5, doi:10.1029/2005JB003663"
 
 OLIVINE = Material(
     name="olivine",
@@ -52,6 +93,35 @@ OLIVINE_GERYA = Material(
     source=f"Gerya (2019), Introduction to Numerical Geodynamic Modelling, 2nd edition, exercise 6.1; {GEOPARAMS}",
 )
 
+ASPECT = "of https://github.com/geodynamics/aspect, commit bf1b061 (2026)"
+
+OLIVINE_WET = Material(
+    name="olivine-wet",
+    title="wet olivine, dislocation creep",
+    law=WET,
+    values={"A_w": 1600.0, "n": 3.5, "r": 1.2, "Q_w": 520e3, "V": 22.0},
+    ranges={"temperature": (1173.0, 1173.0), "pressure": (1000.0, 1000.0), "hydrogen": (82423.0, 82423.0)},
+    source=f"{HIRTH}, doi:10.1029/138GM06; tests/hk04_olivine_dislocation_hydration_prefactor.prm {ASPECT}",
+)
+
+OLIVINE_MEI = Material(
+    name="olivine-mei",
+    title="olivine at low temperature, glide",
+    law=PEIERLS,
+    values={"A_p": 1.4e-7, "n": 2.0, "Q_p": 320e3, "stress_p": 5900.0, "p_1": 0.5, "q": 1.0},
+    ranges={"stress": (900.0, 1000.0), "temperature": (1073.0, 1073.0)},
+    source=f"Mei et al. (2010), flow law in the head of tests/visco_plastic_peierls_mei_exact.prm {ASPECT}",
+)
+
+OLIVINE_IDRISSI = Material(
+    name="olivine-idrissi",
+    title="olivine at low temperature, glide, from tests of single crystals and models",
+    law=PEIERLS,
+    values={"A_p": 1e6, "n": 0.0, "Q_p": 566e3, "stress_p": 3800.0, "p_1": 0.5, "q": 2.0},
+    ranges={"stress": (109.0, 110.0), "temperature": (1073.0, 1073.0)},
+    source=f"Idrissi et al. (2016), flow law in the head of tests/visco_plastic_peierls_idrissi_exact.prm {ASPECT}",
+)
+
 ANORTHITE = Material(
     name="anorthite",
     title="dry anorthite, diffusion creep",
@@ -65,4 +135,4 @@ ANORTHITE = Material(
 
 @hookimpl
 def creepkit_materials() -> list[Material]:
-    return [OLIVINE, OLIVINE_GERYA, ANORTHITE]
+    return [OLIVINE, OLIVINE_GERYA, OLIVINE_WET, OLIVINE_MEI, OLIVINE_IDRISSI, ANORTHITE]

@@ -34,7 +34,7 @@ ANAND = CreepLaw(
         a: Param("exponent of hardening", bounds=(1.0, 3.0)),
     },
     states={s: State(21.0, h_0 * (sympy.Max(below, 0) ** a - sympy.Max(-below, 0) ** a) * rate, "resistance", "MPa")},
-    references=("Brown, Kim and Anand (1989), Int. J. Plasticity 5, 95",),
+    references=("Anand (1985)", "Brown, Kim and Anand (1989)"),
 )
 
 SAC305 = Material(

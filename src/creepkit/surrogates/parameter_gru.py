@@ -30,7 +30,7 @@ from creepkit.language import CreepLaw
 from creepkit.options import Options, option
 from creepkit.records import Dimension, History, Program, Specimen, dimension_named, dimensions_of
 from creepkit.sampling.conditions import MODULUS, TEMPERATURE, TimeGrid
-from creepkit.surrogates.network_evaluation import ParameterNetwork, SampleArrays, Weights
+from creepkit.surrogates.network_evaluation import ParameterNetwork, Precision, SampleArrays, Weights
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -530,10 +530,11 @@ class ParameterGru(Options, title="settings of a network"):
         columns_of_data = data.outputs, data.grid, data.parameter_names, data.condition_names
         return SurrogateMetadata(data.law, data.specimen, *columns_of_data, domain, scaling, notes=notes)
 
-    def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
+    def network(self, weights: Weights, metadata: SurrogateMetadata, precision: Precision) -> ParameterNetwork:
         """The trained network; SurrogateError where the weights are not those of this recipe."""
         sizes = len(metadata.scaling["inputs"]), len(metadata.scaling["series"]), len(metadata.outputs)
-        return ParameterNetwork.from_weights(weights, sizes, (self.hidden, self.layers), logarithm=self.target == "log")
+        shape, logarithm = (self.hidden, self.layers), self.target == "log"
+        return ParameterNetwork.from_weights(weights, sizes, shape, logarithm=logarithm, precision=precision)
 
     def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
         """The inputs that tests give: modulus, lengths and temperature that varied in training, and the series."""
