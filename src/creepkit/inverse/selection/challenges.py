@@ -253,8 +253,8 @@ LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
 """Of the best law, from which excesses count."""
 
 
-ALTERED_STEPS = replace(LAST_STEPS, gain=1e-3)
-"""Of altered laws, whose valleys are long: of a step that promises a thousandth of chi-square the promise is enough."""
+ALTERED_STEPS = replace(LAST_STEPS, gain=3e-4)
+"""Of altered laws, whose valleys are long: of a step that promises less than that of chi-square the promise counts."""
 
 
 FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
