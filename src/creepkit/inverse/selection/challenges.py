@@ -253,8 +253,8 @@ LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
 """Of the best law, from which excesses count."""
 
 
-ALTERED_STEPS = replace(LAST_STEPS, gain=3e-4)
-"""Of altered laws, whose valleys are long: of a step that promises less than that of chi-square the promise counts."""
+PROMISED = 0.05
+"""Of chi-square: of a step of an altered law that would lower it by less, the promise is enough."""
 
 
 FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
@@ -485,7 +485,8 @@ def _least_excess(
 
     It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    least, last = best.problem.chi_square(best.x), ALTERED_STEPS
+    least = best.problem.chi_square(best.x)
+    last = replace(LAST_STEPS, gain=PROMISED / least)
     if best.reduced is not None:
         cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
         found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
