@@ -34,7 +34,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.conditions import noise_correlation_text
-from creepkit.readers.parts_of_tests import read_tests
+from creepkit.readers.parts_of_tests import read_tests, with_clocks_joined
 from creepkit.readers.questions import collected, raise_all
 from creepkit.readers.table import CellTable
 from creepkit.readers.table_heads import is_frame, names_time, sources_of_names
@@ -103,9 +103,8 @@ HISTORY_CSV = HistoryCsvReader("csv", "a table as text: `# key: value` lines, th
 
 def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: HeaderVocabulary) -> list[History]:
     """The histories of the tests in one file; those without a name have that of their sheet or of the file."""
-    tests = list(found)
-    sheets = {test.table.sheet for test in tests}
-    names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
+    tests = with_clocks_joined(list(found), path, vocabulary)
+    names = _names_of(tests, path)
     errors, histories = list[HistoryError](), list[History]()
     tests = [
         replace(one, table=replace(one.table, sources=(*one.table.sources, *sources_of_names(one.table, vocabulary))))
@@ -122,6 +121,23 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
         histories += [] if history is None else [history]
     raise_all(errors)
     return histories
+
+
+def _names_of(tests: Sequence[TabulatedTest], path: Path) -> list[str]:
+    """The names of tests; those without one have that of their sheet or of the file, with a number where it is twice.
+
+    HistoryError where two are called the same.
+    """
+    sheets = {test.table.sheet for test in tests}
+    names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
+    places = [(test.table.sheet, name) for test, name in zip(tests, names, strict=True)]
+    for k, test in enumerate(tests):
+        if places.count(places[k]) > 1 and test.name:
+            what = f"two tests are called '{quoted(test.name, 60)}'; give each its own name"
+            raise HistoryError(f"{test.table.location(test.table.columns_line)}: {what}")
+        if places.count(places[k]) > 1:
+            names[k] = f"{names[k]} ({places[: k + 1].count(places[k])})"
+    return names
 
 
 def _refuse_one_for_all(tests: Sequence[TabulatedTest], vocabulary: HeaderVocabulary) -> None:

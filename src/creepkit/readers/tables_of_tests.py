@@ -31,6 +31,7 @@ from creepkit.readers.columns_of_tests import (
 )
 from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
 from creepkit.readers.questions import Question, collected
+from creepkit.readers.remarks import rows_beside_notes
 from creepkit.readers.table import (
     POINT_OF_THOUSANDS,
     CellTable,
@@ -40,7 +41,6 @@ from creepkit.readers.table import (
     without_ignored,
 )
 from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, sources_of_names, with_entries_of_comments
-from creepkit.readers.table_layouts import rows_beside_notes
 from creepkit.readers.tests_file import answers_of
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
