@@ -55,8 +55,8 @@ from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
-from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, words_of
+from creepkit.readers.weak_sources import with_weak_sources
 from creepkit.records import (
     SECONDS_PER_HOUR,
     UNKNOWN_DURATION,
@@ -323,7 +323,7 @@ def _time_and_end(
     return time, "".join(said), False
 
 
-_HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?)(?!\w)", re.IGNORECASE)
+_HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?|ore|horas)(?!\w)", re.IGNORECASE)
 """A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
 
 
@@ -551,11 +551,11 @@ def _end_of_test(
 # ---- compression -----------------------------------------------------------------------------------------------------
 
 
-_COMPRESSION = re.compile(r"\bcompress(?:ion|ive|ed)\b|druckkriech|stauchversuch", re.IGNORECASE)
+_COMPRESSION = re.compile(r"\bcompres(?:s(?:ion|ive|ed|ione)|i[oó]n)\b|druckkriech|stauchversuch", re.IGNORECASE)
 """Of a test that presses, in English, French and German; a compressor disc is none."""
 
 
-_TENSION = re.compile(r"tensi|traction|zug", re.IGNORECASE)
+_TENSION = re.compile(r"tensi|traction|trazione|tracci|zug", re.IGNORECASE)
 """Beside them of a machine for both."""
 
 

@@ -33,7 +33,6 @@ from creepkit.readers.ends_of_tests import (
 from creepkit.readers.frames import TableFrames
 from creepkit.readers.questions import Answer, Question, collected, raise_all
 from creepkit.readers.table import SourceText
-from creepkit.readers.table_heads import LOAD_AGREEMENT, TEMPERATURE_AGREEMENT, conditions_in_text
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
     SPECIMEN_NAME_PATTERN,
@@ -45,6 +44,7 @@ from creepkit.readers.vocabulary import (
     unit_suffix,
     value_in,
 )
+from creepkit.readers.weak_sources import LOAD_AGREEMENT, TEMPERATURE_AGREEMENT, conditions_in_text
 from creepkit.records import History, Program
 from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
 from creepkit.records.units import time_text

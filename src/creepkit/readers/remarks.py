@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from creepkit.errors import HistoryError, quoted
@@ -11,8 +11,31 @@ from creepkit.files.delimited_text import float_of, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of, cells_of_width
-from creepkit.readers.table_heads import conditions_in_text
 from creepkit.readers.vocabulary import Terms
+from creepkit.readers.weak_sources import conditions_in_text
+
+
+def tests_named(text: str, names: Sequence[str]) -> set[int]:
+    """Which of several tests a text names, perhaps by the first word of their names, as `C3` is of `C3 120 MPa`.
+
+    Numbers and single letters are no names in a text.
+    """
+    firsts = [name.split(" ")[0] for name in names]
+    found = set[int]()
+    for k, name in enumerate(names):
+        is_first = firsts.count(firsts[k]) == 1 and re.search(r"[^\W\d]", firsts[k]) and re.search(r"\d", firsts[k])
+        forms = [form for form in (name, *[firsts[k]] * bool(is_first)) if len(form) > 1 and not form.isdigit()]
+        found |= {k} if any(re.search(rf"(?<!\w){re.escape(form)}(?!\w)", text) for form in forms) else set()
+    return found
+
+
+def notes_by_name(entries: Sequence[Mapping[str, SourceText]], names: Sequence[str]) -> Iterator[dict[str, SourceText]]:
+    """The entries of each test without the titles and notes that name others of the file, and not this one."""
+    shared = {key: one for key, one in entries[0].items() if key.startswith("label ")} if len(names) > 1 else {}
+    shared = {key: one for key, one in shared.items() if all(own.get(key) == one for own in entries)}
+    named = {key: tests_named(one.text, names) for key, one in shared.items()}
+    for k, own in enumerate(entries):
+        yield {key: one for key, one in own.items() if not named.get(key) or k in named[key]}
 
 
 def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Collection[str] = ()) -> CellTable:
@@ -89,7 +112,7 @@ def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
 
 
 _OF_PAUSE = re.compile(
-    r"restart|resum|reload|pause|interrupt|power|unterbr|fortgesetzt|repris|ripres|rean", re.IGNORECASE
+    r"restart|resum|reload|pause|interrupt|power|unterbr|fortgesetzt|repris|ripres|riavvi|rean", re.IGNORECASE
 )
 """Of a row of text behind which the same test goes on, though its clock may begin anew."""
 

@@ -25,10 +25,10 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve, through_midnight
+from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
 from creepkit.readers.vocabulary import (
-    STATED_BY_NAME,
     HeaderVocabulary,
     Terms,
     plain_name,

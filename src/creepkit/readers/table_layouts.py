@@ -17,6 +17,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
+from creepkit.readers.names import NAMES_OF
 from creepkit.readers.remarks import rows_beside_notes, without_remarks, without_remarks_around
 from creepkit.readers.table import (
     CellTable,
@@ -33,23 +34,14 @@ from creepkit.readers.table import (
 from creepkit.readers.table_heads import (
     HeadedTable,
     HeadOfTest,
-    conditions_in_text,
-    conditions_of_head,
     headed_table,
     heads_of_tests,
     is_frame,
     is_time,
     test_and_column,
 )
-from creepkit.readers.vocabulary import (
-    NAMES_OF,
-    HeaderVocabulary,
-    Terms,
-    names_tests,
-    split_written_name,
-    unit_suffix,
-    words_of,
-)
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, split_written_name, unit_suffix, words_of
+from creepkit.readers.weak_sources import conditions_in_text, conditions_of_head
 from creepkit.records.quantities import STRAIN
 
 # ---- tests in rows ---------------------------------------------------------------------------------------------------
@@ -274,7 +266,8 @@ def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTe
 
 
 _TITLE_OF_TEST = re.compile(
-    r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|bar)[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
+    r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|provino|prova|probeta|ensayo|bar)"
+    r"[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
     r"(\S.*)",
     re.IGNORECASE,
 )
@@ -283,7 +276,7 @@ _TITLE_OF_TEST = re.compile(
 def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
     """The tables below one another that each begin with titles and names of columns; [] of a single one.
 
-    One whose head says nothing new and whose times go on is the same test on a new page.
+    One whose head says nothing new is the same test on a new page, or behind a pause.
     """
     starts, head, last, blocks = [0], -1, -1, list[list[TableRow]]()
     for k, row in enumerate(table.rows):
@@ -300,9 +293,7 @@ def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
         body = next((k for k, row in enumerate(part) if is_frame(row, table)), len(part))
         said = {cell for row in blocks[-1] for cell in row.cells} if blocks else set()
         is_new = any(cell not in said for row in part[:body] for cell in row.cells)
-        around = [*(blocks[-1][-1:] if blocks else ()), *part[body : body + 1]]
-        times = [next((float_of(c) for c in row.cells if is_number(c, table.dialect)), 0.0) for row in around]
-        if is_new or len(times) < 2 or times[1] < times[0]:
+        if is_new:
             blocks.append(part)
         else:
             blocks[-1] += part[body:]

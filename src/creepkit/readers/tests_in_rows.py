@@ -64,10 +64,10 @@ from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
 from creepkit.readers.table import CellTable, SourceText, TableRow
-from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.tables_of_tests import MOST_ASKED, TestRow, TestTable
 from creepkit.readers.text_files import peek_table, read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary, split_written_name, unit_suffix, words_of
+from creepkit.readers.weak_sources import with_weak_sources
 from creepkit.records import History
 from creepkit.records.quantities import STRESS, TEMPERATURE, TIME, QuantityKind
 
@@ -116,7 +116,8 @@ class RowPerTestReader:
         for table in self.tables(path, errors):
             if not table.is_understood:
                 continue
-            for row, end in zip(table.rows, ends_of_rows(table), strict=True):
+            for row, end, notes in zip(table.rows, ends_of_rows(table), table.notes_of_rows(), strict=True):
+                row.stated = {**notes, **row.stated}
                 if (end.is_open or row.is_open) and errors:
                     continue
                 history = collected(errors, partial(self._history, table, row, end))
@@ -178,7 +179,7 @@ class RowPerTestReader:
         ]
         if assumed := ", ".join(filter(None, assumptions)):
             entries.setdefault("label assumed", SourceText(assumed, location))
-        name, where = f"{sheet.sheet or sheet.path.stem} {row.line}", f"sheet {sheet.sheet}, " if sheet.sheet else ""
+        name, where = table.name_of(row), f"sheet {sheet.sheet}, " if sheet.sheet else ""
         source = f"{sheet.path} ({where}{cells['name'].entry.text if 'name' in cells else f'line {row.line}'})"
         if not frames:
             return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
@@ -512,7 +513,9 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
     of_axis = {across: unit, down: units}
     for one in _named_axes(reversed(said)):
         of_axis[one.quantity] = of_axis[one.quantity] or one.unit
-    is_stress = of_axis["stress"] or any(re.search(r"stress|spannung|contrainte|σ|MPa", text) for text in said)
+    is_stress = of_axis["stress"] or any(
+        re.search(r"stress|spannung|contrainte|sforzo|tensi[oó]n|esfuerzo|σ|MPa", text) for text in said
+    )
     is_whole = "" not in levels and len(levels) == len(body)
     if not (is_stress and is_whole and of_axis["temperature"]):
         return None
