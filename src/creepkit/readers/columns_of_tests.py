@@ -263,6 +263,7 @@ _NUMBER_LIKE = re.compile(
     r"(?:[<>≥≤~≈(\[]|>=|ca\.? )*\s*[+-]?\d[\d.,'’\s]*(?:[eEdD][+-]?\d+)?\s*(?:[+*)\]†‡#→h]|->|\.\.\.|…)*"
 )
 _WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*(\S{1,6})")
+_ASSIGNED = re.compile(r"[^()\[\]=]+=\s*[\d.,]+\s*\S{1,6}")  # "E = 170 GPa"
 _SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
 """Rows within which the tests must begin; rows of a head; and of a table whose tests stand in columns."""
 
@@ -325,7 +326,7 @@ def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
     is_head = len(set(filled)) > 1 or bool(unit_suffix(filled[0]))
-    return is_head and not any(_is_measured(cell, dialect) for cell in filled)
+    return is_head and not any(_is_measured(cell, dialect) or _ASSIGNED.fullmatch(cell) for cell in filled)
 
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:

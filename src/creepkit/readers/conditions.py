@@ -19,6 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from creepkit.errors import CreepkitError, HistoryError, quoted
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -257,6 +258,13 @@ class StatedConditions:
             _length(name, entry, self.terms, is_free=False)
             misspelt = self._misspelt(key) if key.strip() else ""
             says_end = kind_of_column(key) in (*FIRM, "remark") and not misspelt.startswith("rupture_")
+            near = self.terms.suggestion(key) or self.terms.suggestion(base)
+            if columns_as_labels and not (says_end or misspelt) and near and is_number(entry.text, Dialect(decimal=entry.decimal)):
+                near = f"{base}_mm" if base in self.terms.dimensions else near
+                what = (
+                    f"'{quoted(key, 60)}' holds numbers and is no known name; did you mean '{near}', or is it a label?"
+                )
+                raise self.question(what, "columns", {key: LABEL}, location=entry.location)
             is_label = says_end or (columns_as_labels and not misspelt)
             if not (key.strip() and is_label):
                 meant = misspelt or self.terms.suggestion(key)

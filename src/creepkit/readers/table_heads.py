@@ -16,6 +16,7 @@ from itertools import pairwise
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
+from creepkit.readers.ends_of_tests import end_said_by, invalidity_said_by
 from creepkit.readers.questions import Answer
 from creepkit.readers.table import CellTable, SourceText, TableRow, with_commas_of_remarks, without_ignored
 from creepkit.readers.vocabulary import (
@@ -224,15 +225,36 @@ def _with_stated(table: CellTable, stated: Mapping[str, tuple[str, str]]) -> Cel
 def with_entries_of_comments(table: CellTable, names_line: int, known: Terms) -> CellTable:
     """The table with the entries of comments between its first row and its names.
 
-    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
+    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere. What a
+    remark or the title of a figure, `# Fig. 4: 650 °C`, states is a weak source.
     """
-    header = dict(table.header)
+    header, sources, remarks = dict(table.header), list(table.sources), list[SourceText]()
     for line, key, entry in table.comments:
+        if not key:
+            remarks += [entry] * (line < names_line)
+            continue
         if line > names_line and known.is_condition(key):
             raise HistoryError(f"{entry.location}: '{key}' stands below the names of the columns; move it above them")
         if line < names_line and header.setdefault(key, entry) is not entry:
             raise HistoryError(f"{entry.location}: '{quoted(key, 60)}' was already given; keep one of them")
-    return replace(table, header=header)
+    titles = [key for key in header if _OF_FIGURE.match(key) and not known.is_condition(key)]
+    for title in (replace(entry, text=f"{key}: {entry.text}") for key, entry in ((k, header.pop(k)) for k in titles)):
+        header[f"label line {title.location.rpartition(':')[2]}"] = title
+        sources += conditions_in_text(title.text.partition(": ")[2], title.location, known)
+    stated = {(split_unit(known.condition(key), known.conditions.kinds) or ("",))[0] for key in header}
+    stated |= {known.quantity(cell) or "" for row in table.rows[:_MOST_ROWS] for cell in row.cells if cell}
+    for remark in remarks:
+        found = [one for one in conditions_in_text(remark.text, remark.location, known) if one.key not in stated]
+        sources += found
+        if found or end_said_by(remark.text) or invalidity_said_by(remark.text):
+            header[f"label line {remark.location.rpartition(':')[2]}"] = remark
+    return replace(table, header=header, sources=tuple(sources))
+
+
+_OF_FIGURE = re.compile(
+    r"(?:fig|figure|abb|bild|curve|kurve|plot|graph|test|series|data ?set|title|titel)\b", re.IGNORECASE
+)
+"""Beginning of a key that is a title."""
 
 
 def _is_of_head(row: TableRow, times: Sequence[int], table: CellTable, known: Terms) -> bool:
@@ -277,6 +299,9 @@ class HeadOfTest:
     entries: dict[str, SourceText] = field(default_factory=dict)
     sources: list[SourceText] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.sources += self.table.sources
 
     def put(self, key: str, text: str, row: TableRow) -> None:
         """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
@@ -328,8 +353,9 @@ class HeadOfTest:
                 value, *cells = cells
                 is_label = not (known.is_condition(plain) or known.misspelt(plain))  # nor nearly a condition
                 if cells and is_number(value, self.table.dialect) and unit_suffix(cells[0]):
-                    key, value = (key, f"{value} {cells[0]}") if is_label else (_with_unit(key, cells[0], place), value)
-                    cells = cells[1:]
+                    with_value = is_label or known.condition(plain).startswith("modulus_at ")
+                    unit, *cells = cells
+                    key, value = (key, f"{value} {unit}") if with_value else (_with_unit(key, unit, place), value)
                 self.put(f"label {plain}" if is_label else key, value, row)
             elif known.is_condition(key):
                 raise HistoryError(f"{place}: '{quoted(key)}' stands above the names of the columns without a value")

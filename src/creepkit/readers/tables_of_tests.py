@@ -207,7 +207,7 @@ class TestTable:
             )
             sheet = sheet.assuming(f"rows of {called} are no tests")
         while body and _is_note(body[-1], dialect, len(names)):
-            self.notes.append("; ".join(dict.fromkeys(filter(None, body.pop().cells))))
+            self.notes.append(re.sub("([:：]);", r"\1", "; ".join(dict.fromkeys(filter(None, body.pop().cells)))))
         named = [k for k, name in enumerate(names) if name]
         stated, beside = dict[str, SourceText](), dict[str, SourceText]()
         for row in body:
@@ -237,7 +237,7 @@ class TestTable:
         for key in [key for key in head.entries if key.startswith("label ") and key not in {*sheet.header, *TEXTS}]:
             entry = head.entries.pop(key)
             self.notes.append(entry.text if key.startswith("label line ") else f"{key[6:]} {entry.text}")
-        self.notes += [f"{key}: {entry.text}" for _, key, entry in sheet.comments]
+        self.notes += [f"{key}: {entry.text}" if key else entry.text for _, key, entry in sheet.comments]
         return head
 
     # ---- columns

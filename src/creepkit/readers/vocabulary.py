@@ -255,6 +255,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
     *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off", "thermal_expansion"),
+    "modulus_by_temperature",
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
@@ -321,6 +322,13 @@ class HeaderVocabulary:
             own_dimensions=[name for d in dimensions_of(known.get(specimen)) for name in d.names],
             changes=[(name, o) for name in named for o in outputs_of(known[name]) if o.change_of],
         )
+
+
+_AT_TEMPERATURE = re.compile(
+    r"(?P<name>.+?)[\s,(\[@]+(?:(?:at|bei|à|a)\s+)?(?P<number>\d+(?:[.,]\d+)?) ?(?P<degrees>(?:°|º|deg\.?)? ?[CKF])"
+    r"[)\]]?(?:[\s,/(\[]+(?P<unit>[GM]Pa|ksi|Msi)[)\]]?)?"
+)
+"""A quantity at a temperature, `E (650 °C)`, `Young's modulus at 650 °C [GPa]`."""
 
 
 @dataclass(frozen=True)
@@ -409,6 +417,8 @@ class Terms:
             return name
         if name.startswith(("label ", "geometry ")):
             return name
+        if (at := _AT_TEMPERATURE.fullmatch(name)) and self.conditions.meaning(at["name"].strip()) == "modulus":
+            return f"modulus_at {at['number']} {at['degrees']}|{at['unit'] or ''}"
         if names_tests(name):
             return "name"
         is_label = label.startswith("label ") and unit_suffix(unit) == ("pct" if unit else None)

@@ -142,3 +142,80 @@ def test_tables_in_italian_and_spanish(read):
     treated = "Acciaio rinvenuto a 730 °C\nSforzo (MPa);120\nTempo (h);Deformazione (%)\n0;0\n1;0,1\n"
     with pytest.raises(HistoryError, match="no temperature"):
         read(treated)
+
+
+RELAXING = "Time (h);Residual stress (MPa);Residual stress (MPa)\n;500 °C;600 °C\n0;250;200\n1;220;150\n10;200;120\n"
+
+
+def test_moduli_at_temperatures(read):
+    """Each test has that of its temperature, in the head of one test as of several."""
+    moduli = "E (500 °C);172 GPa\nYoung's modulus at 600 °C;160;GPa\n"
+    for head, expected in (("Temperature;500 °C\n", 172e3), ("Temperature;550 °C\n", 166e3)):
+        (test,) = read(f"{head}{moduli}{MPA}{STRAIN}0;0\n1;0,1\n2;0,15\n")
+        assert test.elastic.E == pytest.approx(expected)
+    tests = read(f"# E (500 °C): 172 GPa\n# E (600 °C): 160 GPa\n# strain_pct: 0.15\n{RELAXING}")
+    assert [one.elastic.E for one in tests] == pytest.approx([172e3, 160e3])
+    with pytest.raises(
+        HistoryError, match=r"modulus is stated at 500 °C; how many GPa is it at 700 °C\? .*modulus_GPa"
+    ):
+        read(f"Temperature;700 °C\nE (500 °C);172 GPa\n{MPA}{STRAIN}0;0\n1;0,1\n")
+
+
+def test_two_columns_of_one_stress_that_the_row_below_tells_apart(read):
+    tests = read(f"Strain 0.15 %; E = 170 GPa\n{RELAXING}", answers='["x.csv"]\nstrain_pct = 0.15\n')
+    assert [(one.specimen, round(one.temperature - 273.15)) for one in tests] == [
+        ("relaxation", 500),
+        ("relaxation", 600),
+    ]
+    assert [one.outputs["stress"][-1] for one in tests] == [200, 120]
+
+
+def test_a_stress_that_alone_was_recorded_relaxed_under_a_strain_that_is_asked_for(read):
+    """It was taken for a creep test under a stress that falls."""
+    curve = "Time (h);Stress (MPa)\n0;250\n1;220\n10;180\n"
+    with pytest.raises(HistoryError, match="a test whose strain was held, which is not stated"):
+        read(C + curve)
+    (test,) = read(f"{C}Hold strain;0,15 %\n{curve}")
+    assert test.loading.quantity == "strain"
+
+
+def test_digitised_points_a_click_out_of_order(read):
+    points = f"{C}{MPA}{STRAIN}0;0\n1;0,1\n5,03;0,16\n{{}};0,15\n20;0,2\n100;0,4\n"
+    (test,) = read(points.format("5,01"))
+    np.testing.assert_allclose(test.times / 3600, [0, 1, 5.01, 5.03, 20, 100])
+    np.testing.assert_allclose(test.outputs["strain"][2:4], [0.0015, 0.0016])
+    assert "in order of time" in test.labels["assumed"]
+    with pytest.raises(HistoryError, match="time falls"):
+        read(points.format("3"))
+
+
+@pytest.mark.parametrize(
+    "comment", ["Fig. 4: 650 °C, 120 MPa", "P91 at 650 °C and 120 MPa", "Abb. 2: 650 °C\n# 120 MPa"]
+)
+def test_comments_above_a_table_state_conditions(read, comment):
+    (test,) = read(f"# {comment}\n{STRAIN}0;0\n1;0,1\n")
+    assert test.condition == "650 °C, 120 MPa"
+    with pytest.raises(HistoryError, match="no temperature"):
+        read(f"# tempered at 750 °C\n{MPA}{STRAIN}0;0\n1;0,1\n")
+
+
+def test_footnotes_below_a_sheet_are_shown(tmp_path):
+    sheet = [
+        ["試験片番号", "試験温度 (°C)", "応力 (MPa)", "破断時間 (h)"],
+        ["A1", 600, 120, 900],
+        ["A2", 600, 100, 3000],
+    ]
+    notes = [["※ 大気中"], ["注) A2 は再試験"]]
+    tests = ck.read_histories(workbook(tmp_path / "j.xlsx", {"S": [*sheet, *notes]}))
+    assert "※ 大気中" in tests[0].labels.values()
+    assert ["注) A2 は再試験" in one.labels.values() for one in tests] == [False, True]
+
+
+def test_numbers_under_a_head_that_is_nearly_a_known_name_are_no_label(tmp_path):
+    (tmp_path / "b1_creep.csv").write_text("time_h,deflection_mm\n0,0\n1,.1\n10,.3\n")
+    for head, near in (("span_furlong", "span_mm"), ("widht_mm", "'width'")):
+        (tmp_path / "index.csv").write_text(
+            f"test,specimen,{head},load_N,temperature_C\nb1,three-point-bend,40,9,600\n"
+        )
+        with pytest.raises(HistoryError, match=near):
+            ck.read_histories(tmp_path)
