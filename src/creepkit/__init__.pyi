@@ -6,6 +6,7 @@ from .api.objects import available as available
 from .api.objects import example_data as example_data
 from .api.objects import law as law
 from .api.objects import load_plugin as load_plugin
+from .api.objects import material as material
 from .api.objects import specimen as specimen
 from .api.saved import load as load
 from .api.simulation import simulate as simulate
@@ -87,6 +88,7 @@ from .records.loading import constant_load as constant_load
 from .records.loading import constant_strain as constant_strain
 from .records.loading import constant_stress as constant_stress
 from .records.loading import load_steps as load_steps
+from .records.material import Material as Material
 from .records.prediction import Nuisance as Nuisance
 from .records.prediction import Prediction as Prediction
 from .records.prediction import Status as Status
@@ -120,6 +122,7 @@ from .testing import check_camera_format as check_camera_format
 from .testing import check_exporter as check_exporter
 from .testing import check_instrument_format as check_instrument_format
 from .testing import check_law as check_law
+from .testing import check_material as check_material
 from .testing import check_predictor as check_predictor
 from .testing import check_reader as check_reader
 from .testing import check_specimen as check_specimen

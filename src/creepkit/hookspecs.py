@@ -13,7 +13,7 @@ import pluggy
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
-    from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Reader, Specimen
+    from creepkit.records import CameraFormat, Exporter, InstrumentFormat, Material, Reader, Specimen
 
 
 PROJECT = "creepkit"
@@ -53,6 +53,11 @@ def creepkit_instruments() -> Sequence[InstrumentFormat]:  # type: ignore[empty-
 @hookspec
 def creepkit_exporters() -> Sequence[Exporter]:  # type: ignore[empty-body]
     """Return exporters that write a law and its values as text."""
+
+
+@hookspec
+def creepkit_materials() -> Sequence[Material]:  # type: ignore[empty-body]
+    """Return published creep laws of materials: values, the range that they hold in, and where they are printed."""
 
 
 @hookspec

@@ -14,45 +14,45 @@ from pathlib import Path
 from helpers.paths import ROOT
 
 BUDGET = {
-    "api": 285,
+    "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2135,
-    "composition": 371,
+    "cli": 2151,
+    "composition": 411,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2738,
+    "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
     "instruments": 1158,
     "integration": 779,
-    "inverse": 9470,
+    "inverse": 9514,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
     "law_search": 765,
     "laws": 136,
-    "modules": 747,
+    "modules": 749,
     "quality": 1143,
     "readers": 6525,
-    "records": 2392,
-    "registry": 608,
-    "reports": 6436,
+    "records": 2467,
+    "registry": 615,
+    "reports": 6564,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2770,
-    "surrogates": 1361,
-    "testing": 1774,
+    "studies": 2785,
+    "surrogates": 1391,
+    "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_141
+TESTS = 30_798
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -11,7 +11,7 @@ from creepkit.errors import HistoryError, nearest
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.records import Specimen
+    from creepkit.records import Material, Specimen
     from creepkit.registry import Plugin
 
 
@@ -31,10 +31,19 @@ def specimen(name: str) -> Specimen:
 
 
 @checked
+def material(name: str) -> Material:
+    """Return the published creep law called `name`: one of `available("materials")`, as `creepkit-materials` has them.
+
+    >>> ck.export(ck.material("chromium"), "abaqus", to="creep.f")  # doctest: +SKIP
+    """
+    return registry.default_registry().one(registry.kinds.MATERIALS, name)
+
+
+@checked
 def available(kind: str) -> dict[str, Any]:
     """Return all that is registered of a kind, {name: value}.
 
-    kind : "laws", "specimens", "readers", "cameras", "instruments", "exporters" or "temperature-forms".
+    kind : "laws", "specimens", "readers", "cameras", "instruments", "exporters", "materials" or "temperature-forms".
     """
     return {name: entry.value for name, entry in registry.default_registry().all(registry.kinds.kind(kind)).items()}
 

@@ -1,4 +1,4 @@
-"""`creepkit list`: laws, specimens, targets of exports, readers and plugins that are known, or one of them in full."""
+"""`creepkit list`: laws, specimens, materials, targets of exports and plugins that are known, or one in full."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ KINDS = f"{', '.join(kinds.LISTED)} or plugins; laws by default."
 
 def command(
     kind: Annotated[str, typer.Argument(metavar="KIND", help=KINDS)] = "laws",
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show this law or specimen in full.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="This law, specimen or material in full.")
+    ] = None,
     *,
     as_json: Json = False,
 ) -> None:
     """What plugins that are installed or named by --plugin offer is listed as well."""
     registry = default_registry()
     chosen = None if kind.lower() in ("plugin", "plugins") else kinds.kind(kind)
-    if name is not None and chosen not in (kinds.LAWS, kinds.SPECIMENS):
-        raise PluginError(f"only a law or a specimen is shown in full; leave '{name}' out")
+    if name is not None and chosen not in catalogue.IN_FULL:
+        raise PluginError(f"only a law, a specimen or a material is shown in full; leave '{name}' out")
     if chosen is None:
         plugins, conflicts = registry.plugins(), registry.conflicts()
         if as_json:
@@ -39,12 +41,12 @@ def command(
         law = registry.law(name)
         found = {name: Registered(law, registry.plugins_of(law)[0])}
     else:
-        found = {name: registry.all(chosen)[registry.specimen(name).name]}
+        found = {name: registry.all(chosen)[registry.one(chosen, name).name]}
     if as_json:
-        written: Any = {kinds.LAWS: catalogue.law_to_json, kinds.SPECIMENS: catalogue.specimen_to_json}
-        documents = [*map(written.get(chosen, catalogue.registered_to_json), found.values())]
+        to_json: Any = catalogue.IN_FULL.get(chosen, (None, catalogue.registered_to_json))[1]
+        documents = [*map(to_json, found.values())]
         print_json(documents if name is None else documents[0])
     elif name is None:
         catalogue.print_registered(chosen, found, registry.conflicts(chosen))
     else:
-        (catalogue.print_law if chosen is kinds.LAWS else catalogue.print_specimen)(found[name])
+        catalogue.IN_FULL[chosen][0](found[name])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import creepkit as ck
-from creepkit.errors import FitError, LawError
+from creepkit.errors import FitError, LawError, nearest
 from creepkit.limits import SEED, Limits
 from creepkit.options import Option
 
@@ -26,7 +27,9 @@ PAPER_SPECIMEN = "bulge"
 
 Files = Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")]
 Tests = Annotated[list[str] | None, typer.Argument(metavar="[TESTS]...", help="Measured files, folders or patterns.")]
-Law = Annotated[str, typer.Argument(metavar="LAW|RESULT.json", help="A law's name, or a file that creepkit wrote.")]
+Law = Annotated[
+    str, typer.Argument(metavar="LAW|RESULT.json", help="A law or a material, or a file that creepkit wrote.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Reader = Annotated[str | None, Option(help="Reader of the files; by default the one that accepts them.")]
 Values = Annotated[dict[str, float] | None, Option(help="A parameter's value.", flag="set", example="n=5.2")]
@@ -53,7 +56,7 @@ def is_file_name(word: str) -> bool:
 
 
 def law_source(text: str) -> CreepLaw | Identification | Ranking | LawWithValues:
-    """A law by name, or else what a file holds: an identification, a ranking, or a law with values."""
+    """A law or a material by name, or else what a file holds: an identification, a ranking, or a law with values."""
     from creepkit.records import LawWithValues
 
     if is_file_name(text):
@@ -66,6 +69,11 @@ def law_source(text: str) -> CreepLaw | Identification | Ranking | LawWithValues
     try:
         return ck.law(text)
     except LawError as error:
+        with suppress(LawError):
+            return ck.material(text).valued
+        near = nearest(text, ck.available("materials"))
+        if "did you mean" in near and "did you mean" not in str(error):
+            raise LawError(f"there is no law or material '{text}': {near}") from None
         if Path(text).is_file():
             raise LawError(f"{error}; for the file of that name write ./{text}") from None
         raise

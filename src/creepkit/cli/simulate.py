@@ -53,6 +53,10 @@ def command(
         raise SolveError("a test needs its end: give --end-h, such as 100")
     if planned.temperature is None and valued.law.uses(temperature):
         raise SolveError(f"law '{valued.law.name}' depends on temperature: give --temperature-c")
+    held = planned.temperature if isinstance(planned.temperature, float) else None
+    for _, level in planned.loads.get("stress", [(0.0, None)]):
+        if caution := valued.caution(temperature=held, stress=level):
+            tell(caution, err=True)
     if picture is not None and not planned.specimen.draws_section:
         raise SolveError(f"--picture: specimen '{planned.specimen.name}' has no section to draw; leave it out")
     specimen: Any = planned.specimen

@@ -8,9 +8,10 @@ thicknesses are found with the scatter between alloys.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,11 +23,19 @@ from creepkit.checked_arguments import checked
 from creepkit.composition.forms import LawsByComposition
 from creepkit.composition.regression import FEWEST_ALLOYS, CompositionRegression
 from creepkit.errors import FitError, refuse_unknown
+from creepkit.inverse.extrapolation import check_isothermal
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-from creepkit.inverse.uncertainty.quantities import STATE_LIMITS
+from creepkit.inverse.uncertainty.quantities import (
+    STATE_LIMITS,
+    PointQuantity,
+    activation_energy,
+    check_state,
+    local_exponent,
+    log_rate,
+)
 from creepkit.limits import Limits
 from creepkit.records import History
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
@@ -43,19 +52,25 @@ WIDEST = 5.0
 """Of the standard deviation of ln of a rate, beyond which tests say nothing of it."""
 
 
+SEVERAL_TEMPERATURES = 10.0
+"""K, between the coldest and the hottest test of an alloy, from which on they tell an activation energy."""
+
+
 @dataclass(frozen=True)
 class PredictedAlloy:
     """What the map says of a composition.
 
-    composition : {element: at.%}. rate : 1/s, and stress_exponent : value and 95 % interval of an alloy of that
-    composition. laws : {name: probability}. improvement : of a proposal, the factor on the rate to be expected beyond
-    the best alloy so far. notes : where it lies outside the alloys.
+    composition : {element: at.%}. rate : 1/s, stress_exponent and activation_energy, J/mol : value and 95 % interval of
+    an alloy of that composition; no energy where too few alloys were tested at several temperatures. laws : {name:
+    probability}. improvement : of a proposal, the factor on the rate to be expected beyond the best alloy so far.
+    notes : where it lies outside the alloys.
     """
 
     composition: Mapping[str, float]
     rate: tuple[float, float, float]
     stress_exponent: tuple[float, float, float]
     laws: Mapping[str, float]
+    activation_energy: tuple[float, float, float] | None = None
     improvement: float = 1.0
     notes: tuple[str, ...] = ()
 
@@ -65,7 +80,8 @@ class CompositionMap(Presentable, Plotted, Tabulated):
     """Creep over compositions.
 
     alloys : their names. contents : (alloys, elements) atomic fractions. log_rate : of ln of the rate in 1/s.
-    point : stress in MPa, temperature in K, strain and time in s at which rates are. left_out : {alloy: why}.
+    point : stress in MPa, temperature in K, strain and time in s at which rates are. activation_energy : in J/mol, of
+    the alloys that were tested at several temperatures, None where they are too few. left_out : {alloy: why}.
     """
 
     alloys: tuple[str, ...]
@@ -74,14 +90,14 @@ class CompositionMap(Presentable, Plotted, Tabulated):
     point: Mapping[str, float]
     log_rate: CompositionRegression
     stress_exponent: CompositionRegression
+    activation_energy: CompositionRegression | None
     laws: LawsByComposition
     left_out: Mapping[str, str]
 
     @checked
     def predict(self, composition: Mapping[str, float], unit: Literal["at.%", "wt.%"] = "at.%") -> PredictedAlloy:
         """The rate, exponent and law of an alloy of a composition, {element: content}, by those that were tested."""
-        for element in composition:
-            refuse_unknown(element, self.elements, FitError, f"the alloys of the map hold no {element}")
+        self._check_elements(composition)
         total = sum(composition.values())
         if min(composition.values(), default=0.0) < 0.0 or not ALLOWED_TOTAL[0] <= total <= ALLOWED_TOTAL[1]:
             raise FitError(f"the contents add up to {total:g} %; give contents from zero on that make 100")
@@ -89,20 +105,34 @@ class CompositionMap(Presentable, Plotted, Tabulated):
         contents = np.array([atomic.get(element, 0.0) for element in self.elements])
         return self._predicted(contents[None] / contents.sum())[0]
 
+    @property
+    def regressions(self) -> dict[str, CompositionRegression]:
+        """Of ln of the rate, the exponent and, where it is known, the activation energy."""
+        named = zip(QUANTITIES, (self.log_rate, self.stress_exponent, self.activation_energy), strict=True)
+        return {name: one for name, one in named if one is not None}
+
+    @cached_property
+    def proposals(self) -> tuple[PredictedAlloy, ...]:
+        """The three compositions to make next for the lowest rate."""
+        return self.propose()
+
+    def _check_elements(self, contents: Mapping[str, Any]) -> None:
+        for element in contents:
+            refuse_unknown(element, self.elements, FitError, f"the alloys of the map hold no {element}")
+
     def _predicted(self, contents: Floats) -> list[PredictedAlloy]:
         """What the map says at contents (points, elements)."""
-        (rate, rate_sd), (exponent, exponent_sd) = (
-            regression.predict(contents) for regression in (self.log_rate, self.stress_exponent)
-        )
+        intervals = {name: _intervals(one, contents) for name, one in self.regressions.items()}
         results = []
         for k, laws in enumerate(self.laws.at(contents)):
-            reach = NORMAL_QUANTILE * rate_sd[k], NORMAL_QUANTILE * exponent_sd[k]
+            at = {name: tuple(one[k].tolist()) for name, one in intervals.items()}
             results.append(
                 PredictedAlloy(
                     dict(zip(self.elements, (100.0 * contents[k]).round(2).tolist(), strict=True)),
-                    tuple(float(np.exp(rate[k] + side * reach[0])) for side in (0, -1, 1)),  # type: ignore[arg-type]
-                    tuple(float(exponent[k] + side * reach[1]) for side in (0, -1, 1)),  # type: ignore[arg-type]
+                    tuple(np.exp(at["ln_rate"]).tolist()),
+                    at["stress_exponent"],
                     dict(zip(self.laws.laws, laws.tolist(), strict=True)),
+                    at.get("activation_energy"),
                     notes=self._outside(contents[k]),
                 )
             )
@@ -132,8 +162,7 @@ class CompositionMap(Presentable, Plotted, Tabulated):
             13, 455), or by what is known least. Each supposes that those before it come out as predicted.
         within : {element: (least, most) at.%}, narrower or wider than the alloys.
         """
-        for element in within or {}:
-            refuse_unknown(element, self.elements, FitError, f"the alloys of the map hold no {element}")
+        self._check_elements(within or {})
         limits = self._limits(within or {})
         candidates = self._candidates(limits, seed)
         sign, regression, chosen = (-1.0 if goal == "highest rate" else 1.0), self.log_rate, list[PredictedAlloy]()
@@ -167,7 +196,6 @@ class CompositionMap(Presentable, Plotted, Tabulated):
 
     def _candidates(self, limits: Floats, seed: int) -> Floats:
         """(points, elements) compositions inside limits (elements, 2)."""
-        drawn = limits[:, 0] + np.random.default_rng(seed).random((DRAWN, len(limits))) * np.diff(limits).T
         balance = int(np.argmax(self.contents.mean(axis=0)))
         drawn = limits[:, 0] + np.random.default_rng(seed).random((DRAWN, len(limits))) * np.diff(limits).T
         drawn[:, balance] = 1.0 - np.delete(drawn, balance, axis=1).sum(axis=1)
@@ -182,6 +210,12 @@ class CompositionMap(Presentable, Plotted, Tabulated):
     drawn_by = "composition.composition_figure", "composition.draw_map"
 
     shown_by = "composition.composition_text"
+
+
+def _intervals(regression: CompositionRegression, contents: Floats) -> Floats:
+    """(points, 3) value and 95 % interval of an alloy at contents (points, elements)."""
+    value, sd = regression.predict(contents)
+    return np.stack([value, value - NORMAL_QUANTILE * sd, value + NORMAL_QUANTILE * sd], axis=1)
 
 
 DRAWN = 4096
@@ -214,23 +248,31 @@ def composition_map(
     if table is None:
         raise FitError("compositions of the alloys are not known; give compositions=, a table or its file")
     point = _point_of(sources, {"stress": stress, "temperature": temperature, "strain": strain})
-    left_out, rows = {name: "it has no composition" for name in sources if name not in table.atomic}, {}
-    for name, source in sources.items():
-        if name not in left_out:
-            rows[name] = _compared(source, point)
-            if not (0.0 < rows[name][0][1] < WIDEST and np.isfinite(rows[name][1]).all()):
-                left_out[name] = "its tests do not determine the rate"
-    alloys = tuple(name for name in rows if name not in left_out)
+    left_out = {name: "it has no composition" for name in sources if name not in table.atomic}
+    rows = {}
+    for name in [one for one in sources if one not in left_out]:
+        try:
+            rows[name] = _compared(sources[name], point)
+        except FitError as error:
+            left_out[name] = str(error)
+    alloys = tuple(rows)
     elements = tuple(dict.fromkeys(e for name in alloys for e in table.atomic[name]))
     if len(alloys) < FEWEST_ALLOYS:
         raise FitError(f"{len(alloys)} alloys have a law and a composition; {FEWEST_ALLOYS} are needed at least")
     contents = np.array([[table.atomic[name].get(e, 0.0) for e in elements] for name in alloys])
     contents = contents / contents.sum(axis=1, keepdims=True)
-    log_rate, exponent = (
-        CompositionRegression.of(elements, contents, *np.array([rows[name][k] for name in alloys]).T) for k in (0, 1)
-    )
-    laws = LawsByComposition.of(contents, [rows[name][2] for name in alloys])
-    return CompositionMap(alloys, elements, contents, point, log_rate, exponent, laws, left_out)
+    laws = LawsByComposition.of(contents, [rows[name][1] for name in alloys])
+
+    def regression(quantity: str) -> CompositionRegression:
+        known = np.array([quantity in rows[name][0] for name in alloys])
+        names = [name for name, one in zip(alloys, known, strict=True) if one]
+        values, sd = np.array([rows[name][0][quantity] for name in names]).reshape(-1, 2).T
+        return CompositionRegression.of(elements, contents[known], values, sd, names)
+
+    rate, exponent, energy = regression("ln_rate"), regression("stress_exponent"), None
+    with suppress(FitError):  # of too few alloys
+        energy = regression("activation_energy")
+    return CompositionMap(alloys, elements, contents, point, rate, exponent, energy, laws, left_out)
 
 
 def _fit_of(source: Any) -> Identification:
@@ -247,25 +289,39 @@ def _point_of(sources: Mapping[str, Any], given: Mapping[str, float | None]) -> 
     if not fits:
         raise FitError("no alloy has an identified law")
     medians = {name: float(np.median([getattr(fit.tested_point, name) for fit in fits])) for name in STATE_LIMITS}
-    return {name: medians[name] if given.get(name) is None else float(given[name] or 0.0) for name in STATE_LIMITS}
+    point = medians | {name: float(value) for name, value in given.items() if value is not None}
+    check_state(point)
+    return point
 
 
-def _compared(source: Any, point: Mapping[str, float]) -> tuple[Sequence[float], Sequence[float], dict[str, float]]:
-    """ln of the rate and the exponent of an alloy, each with its standard deviation, and the weights of its laws."""
-    average, where = ModelAverage.from_ranking(source), dict(point)
+QUANTITIES = ("ln_rate", "stress_exponent", "activation_energy")
+"""Of an alloy: ln of the rate in 1/s, the exponent, and J/mol."""
+
+
+def _compared(source: Any, point: Mapping[str, float]) -> tuple[dict[str, tuple[float, float]], dict[str, float]]:
+    """{quantity: (value, standard deviation)} of an alloy, the energy where tests tell it, and weights of its laws.
+
+    FitError where its tests do not say the rate at that point.
+    """
+    average = ModelAverage.from_ranking(source)
+    check_isothermal(average.stated_laws, average.ranges, point["temperature"])
     average = replace(average, fits=tuple(fit.by_tests_alone for fit in average.fits))
-    stress, temperature = where.pop("stress"), where.pop("temperature")
-    rate, exponent = (
-        np.array(quantity(stress, temperature, **where, warn=False), float).ravel()
-        for quantity in (average.rate, average.local_exponent)
-    )
-    with np.errstate(all="ignore"):
-        log_rate = np.log(rate)
+    asked: dict[str, PointQuantity] = {"ln_rate": log_rate, "stress_exponent": local_exponent}
+    low, high = average.ranges["temperature"]
+    if high - low >= SEVERAL_TEMPERATURES:
+        asked["activation_energy"] = activation_energy
     weights = dict.fromkeys((fit.law.name for fit in average.fits), 0.0)
     for fit, weight in zip(average.fits, average.weights, strict=True):
         weights[fit.law.name] += weight
-    values = [(v[0], (v[2] - v[1]) / (2.0 * NORMAL_QUANTILE)) for v in (log_rate, exponent)]
-    return values[0], values[1], weights
+    with np.errstate(all="ignore"):
+        intervals = {name: average.interval_at(quantity, point) for name, quantity in asked.items()}
+    values = {
+        name: (float(value), float(high - low) / (2.0 * NORMAL_QUANTILE))
+        for name, (value, low, high) in intervals.items()
+    }
+    if not (0.0 < values["ln_rate"][1] < WIDEST and np.isfinite(values["stress_exponent"]).all()):
+        raise FitError("its tests do not determine the rate")
+    return {k: v for k, v in values.items() if k != "activation_energy" or v[1] > 0.0}, weights
 
 
 def map_where_known(sources: Mapping[str, Any], compositions: Compositions | None = None) -> dict[str, CompositionMap]:

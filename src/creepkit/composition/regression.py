@@ -53,7 +53,7 @@ class CompositionRegression:
 
     contents : (alloys, elements) atomic fractions. values, sd : (alloys,) identified values and their standard
     deviations, in the unit of the property. kernel : of scikit-learn, with its sizes found, of values over `scale`.
-    mean, scale : of the values, by which they are standardised.
+    mean, scale : of the values, by which they are standardised. alloys : their names, where they are known.
     """
 
     elements: tuple[str, ...]
@@ -63,12 +63,16 @@ class CompositionRegression:
     kernel: object
     mean: float
     scale: float
+    alloys: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, elements: Sequence[str], contents: Floats, values: Floats, sd: Floats) -> CompositionRegression:
+    def of(
+        cls, elements: Sequence[str], contents: Floats, values: Floats, sd: Floats, alloys: Sequence[str] = ()
+    ) -> CompositionRegression:
         """That of values; FitError where there are too few alloys.
 
-        contents : (alloys, elements) atomic fractions. values, sd : (alloys,) in the unit of the property.
+        contents : (alloys, elements) atomic fractions. values, sd : (alloys,) in the unit of the property. alloys :
+        their names.
         """
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import ConstantKernel, DotProduct, Matern, WhiteKernel
@@ -88,7 +92,7 @@ class CompositionRegression:
         process = GaussianProcessRegressor(
             kernel, alpha=np.maximum(sd / scale, LEAST_SD) ** 2, optimizer=_greatest_posterior
         ).fit(contents, (values - mean) / scale)
-        return cls(tuple(elements), contents, values, sd, process.kernel_, mean, scale)
+        return cls(tuple(elements), contents, values, sd, process.kernel_, mean, scale, tuple(alloys))
 
     @property
     def scatter(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -42,8 +43,9 @@ def export(
     """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
 
     source : a law, which needs `values` {parameter: value}, or an identification or a temperature law, whose intervals
-        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or the
-        record of law_with_values(), which may have notes, and a name for the target, as well.
+        and range of validity become comments, or a ranking, whose best law is written with the verdict on it, or a
+        material, whose range and source become comments, or the record of law_with_values(), which may have notes, and
+        a name for the target, as well.
     target : one of `available("exporters")`, or an exporter itself. units : of stress and time in the text,
         Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
@@ -57,7 +59,8 @@ def export(
     if units is not None:
         record = record.replace(units=_units(units))
     if temperature is not None:
-        record = record.replace(notes=(*record.notes, f"taken at a temperature of {temperature:g} K")).at(temperature)
+        taken = (f"taken at a temperature of {temperature:g} K", record.caution(temperature=temperature))
+        record = record.replace(notes=(*record.notes, *filter(None, taken))).at(temperature)
     text = exported_text(exporter, record)
     if to is not None:
         write_text(text, Path(to), ExportError, force=force)
@@ -99,6 +102,34 @@ def exported_text(exporter: Exporter, source: LawWithValues) -> str:
     if not isinstance(text, str):
         raise ExportError(f"{what} returned a {type(text).__name__}; it must return a str")
     return text
+
+
+PROGRAMS: Mapping[str, Mapping[str, str]] = {
+    "Abaqus": {
+        "abaqus-cards": "*CREEP",
+        "abaqus": "*CREEP, LAW=USER with a subroutine",
+        "mfront": "an MFront behaviour",
+    },
+    "CalculiX": {
+        "calculix-cards": "*CREEP",
+        "calculix": "*CREEP, LAW=USER with a subroutine",
+        "mfront": "an MFront behaviour",
+    },
+    "Ansys": {"ansys": "TB,CREEP", "abaqus": "a subroutine USERCREEP"},  # which is given what CREEP is
+}
+"""{finite element code: {target: how the line of its creep law begins, or what it needs}}, the simplest first."""
+
+
+def input_of_programs(source: Valued) -> dict[str, str]:
+    """{finite element code: the line of its own creep law where the law is one, else the routine that it needs}."""
+    found: dict[str, str] = {}
+    for program, targets in PROGRAMS.items():
+        for target, needed in targets.items():
+            with suppress(ExportError):
+                text = exported_text(default_registry().one(kinds.EXPORTERS, target), source.valued)
+                found[program] = next((one for one in text.splitlines() if one.startswith(needed)), needed)
+                break
+    return found
 
 
 def _units(units: Units | Mapping[str, str]) -> Units:

@@ -28,6 +28,9 @@ from creepkit.errors import FitError
 from creepkit.inverse.noise_model import NoiseModel, Residuals, StoppedTests
 from creepkit.inverse.observation_series import ObservationSeries
 
+ABSOLUTE_JITTER, RELATIVE_JITTER = 1e-10, 1e-9
+"""Of variances, as in src/core/noise_likelihood.hpp."""
+
 
 def _check(code: int) -> None:
     """Raise what a function of the core returned."""
@@ -98,8 +101,13 @@ class CovarianceFactor:
 
     @cached_property
     def standard_deviations(self) -> Floats:
-        """(tests, observations) of each observation, with all effects."""
-        variances = np.diagonal(self.blocks, axis1=1, axis2=2)
+        """(tests, observations) of each observation, with all effects: 1 of those without data."""
+        series, shared, variances = self.series, self.components[-3:], np.ones(self.series.shape)
+        noise, misfit, offset, drift, _ = self.components[:-3].reshape(-1, 5)[series.output].T
+        w, s, u, d, *effects = series.loadings[:, 1 : 5 + series.effects].T
+        states = np.stack([drift, offset * s, shared[1] * u, shared[0] * d, *effects])
+        of_states, white = (states**2).sum(axis=0), (noise * w) ** 2 + misfit**2
+        variances.flat[series.places] = (1.0 + RELATIVE_JITTER) * of_states + white + ABSOLUTE_JITTER
         return np.sqrt(variances if self.common is None else variances + (self.common**2).sum(axis=-1))
 
     @cached_property

@@ -376,9 +376,12 @@ class Perturbation:
     @property
     def change_text(self) -> str:
         """By how much it changes the rate at the reference point: in per cent, large ones as a factor."""
-        if self.rate_change >= LARGEST_PER_CENT:
-            return f"a factor of {float(np.exp(self.rate_change)):.2g}"
-        return f"{100 * self.rate_change:.2g} %"
+        return _change_text(self.rate_change)
+
+    @property
+    def test_change_text(self) -> str:
+        """By how much a drift changes the rate of a test at its end; "" of all else."""
+        return _change_text(abs(self.per_kelvin) * self.size) if np.isfinite(self.per_kelvin) else ""
 
     @property
     def sentence(self) -> str:
@@ -413,8 +416,12 @@ def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
     changes = [p.rate_change for p in beyond_intervals(perturbations)]
     if not changes:
         return ""
-    total = float(np.sqrt(np.sum(np.square(changes))))
-    return f"a factor of {np.exp(total):.2g}" if total >= LARGEST_PER_CENT else f"{100 * total:.2g} %"
+    return _change_text(float(np.sqrt(np.sum(np.square(changes)))))
+
+
+def _change_text(change: float) -> str:
+    """A change of ln of a rate in per cent, large ones as a factor."""
+    return f"a factor of {float(np.exp(change)):.2g}" if change >= LARGEST_PER_CENT else f"{100 * change:.2g} %"
 
 
 def unmodelled_note(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:

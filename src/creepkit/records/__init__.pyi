@@ -32,6 +32,7 @@ from .loading import constant_strain as constant_strain
 from .loading import constant_stress as constant_stress
 from .loading import load_steps as load_steps
 from .loading import loading_of as loading_of
+from .material import Material as Material
 from .nuisance_programs import SCALABLE_LOADS as SCALABLE_LOADS
 from .nuisance_programs import STEP_DURATION as STEP_DURATION
 from .nuisance_programs import changed_fields as changed_fields

@@ -95,6 +95,15 @@ class LawWithValues:
         """The same with some fields changed."""
         return replace(self, **changes)
 
+    def caution(self, **point: float | None) -> str:
+        """What of a point, in MPa, K, s and units of conditions, lies outside the ranges; "" where nothing does."""
+        beyond = [
+            f"{name} {value:.4g}{_UNITS.get(name, '')} (known from {low:.4g} to {high:.4g}{_UNITS.get(name, '')})"
+            for name, (low, high) in self.ranges.items()
+            if (value := point.get(name)) is not None and not _within(value, low, high)
+        ]
+        return f"caution: extrapolated: {', '.join(beyond)}" if beyond else ""
+
     @checked
     def at(self, temperature: float | None = None, /, **conditions: float) -> LawWithValues:
         """The same with numbers in the place of the temperature, K, and of conditions, in the law's units."""
@@ -121,3 +130,11 @@ class LawWithValues:
         values = {name: self.values[name] for name in law.names}
         law = replace(law, name=self.law.name, title=self.law.title)
         return replace(self, law=law, values=values, notes=(*self.notes, f"switched off and left out: {description}"))
+
+
+_UNITS = {"stress": " MPa", "temperature": " K", "time": " s"}
+
+
+def _within(value: float, low: float, high: float) -> bool:
+    """Whether a number lies in a range, or beside it by what rounding may have moved it: 1 K at 1000 K."""
+    return bool(low - 1e-3 * abs(low) <= value <= high + 1e-3 * abs(high))

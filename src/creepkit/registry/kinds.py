@@ -175,10 +175,16 @@ EXPORTERS = PluginKind(
     "exporter", hookspecs.creepkit_exporters, ExportError, lambda: _records().Exporter, listed="targets",
     edit="text()", use="creepkit export norton --to $name --set A=1e-16 --set n=5",
 )  # fmt: skip
+MATERIALS = PluginKind(
+    "material", hookspecs.creepkit_materials, LawError, lambda: _records().Material,
+    edit="its values, ranges and source", use="creepkit list materials $name",
+)  # fmt: skip
 TEMPERATURE_FORMS = PluginKind("temperature form", hookspecs.creepkit_temperature_forms, LawError)
 
 
-KINDS: tuple[PluginKind[Any], ...] = (LAWS, SPECIMENS, READERS, CAMERAS, INSTRUMENTS, EXPORTERS, TEMPERATURE_FORMS)
+KINDS: tuple[PluginKind[Any], ...] = (
+    *(LAWS, SPECIMENS, READERS, CAMERAS, INSTRUMENTS, EXPORTERS, MATERIALS, TEMPERATURE_FORMS),
+)
 
 
 LISTED = {one.listed or one.plural: one for one in KINDS}

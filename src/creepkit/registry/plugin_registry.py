@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 MORE_LAWS = 'plugins bring more: pip install "creepkit[plugins]"'
-"""The end of the sentence about a law that is not installed."""
+"""The end of the sentence about a law, or a material, that is not installed."""
 
 
 _T = TypeVar("_T")
@@ -201,7 +201,8 @@ class Registry:
             raise kind.error(
                 f"there is no {kind.label} '{name}'; choose one of those that serve it: {', '.join(serving)}"
             )
-        more = f"; {MORE_LAWS}" if kind is kinds.LAWS and all(one.is_own for one in self._sources) else ""
+        bare = kind in (kinds.LAWS, kinds.MATERIALS) and all(one.is_own for one in self._sources)
+        more = f"; {MORE_LAWS}" if bare else ""
         near = nearest(name, known)
         if kind is kinds.LAWS and not near.startswith("did you mean"):
             more += "; that of a file: creepkit --plugin FILE.py before the command, or ck.load_plugin"

@@ -1,8 +1,9 @@
-"""What is registered, for people and as JSON: laws, specimens and plugins."""
+"""What is registered, for people and as JSON: laws, specimens, materials and plugins."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from creepkit.registry import kinds
@@ -12,21 +13,25 @@ from creepkit.reports.terminal import print_table, tell
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.records import Specimen
+    from creepkit.records import Material, Specimen
     from creepkit.registry import Plugin, Registered
 
 
-DETAILS = {kinds.LAWS: ("parameters", "names"), kinds.SPECIMENS: ("outputs", "outputs")}
-"""{kind: what a list of it names of each, and where that stands}."""
+DETAILS: dict[kinds.PluginKind[Any], tuple[str, Callable[[Any], str]]] = {
+    kinds.LAWS: ("parameters", lambda law: " ".join(law.names)),
+    kinds.SPECIMENS: ("outputs", lambda specimen: " ".join(specimen.outputs)),
+    kinds.MATERIALS: ("range", lambda material: ", ".join(material.spans)),
+}
+"""{kind: what a list of it says of each, and its text}."""
 
 
 def print_registered(
     kind: kinds.PluginKind[Any], found: Mapping[str, Registered[Any]], conflicts: Sequence[str]
 ) -> None:
     """Print one row each, and on stderr what was left out because two plugins offer it."""
-    head, parts = DETAILS.get(kind, ("from", ""))
+    head, text = DETAILS.get(kind, ("from", None))
     rows = [
-        (name, getattr(one.value, "title", ""), " ".join(getattr(one.value, parts)) if parts else str(one.provenance))
+        (name, getattr(one.value, "title", ""), text(one.value) if text else str(one.provenance))
         for name, one in found.items()
     ]
     print_table(f"{len(rows)} {kind.listed or kind.plural}", ("name", "title", head), rows)
@@ -107,6 +112,33 @@ def specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
         "nuisances": list(specimen.nuisances),
         "provenance": str(entry.provenance),
     }
+
+
+def print_material(entry: Registered[Material]) -> None:
+    """Print the law of a material with its values, its range and its source, as an export states them."""
+    from creepkit.exporters.law_description import heading
+
+    tell("\n".join([entry.value.name, *heading(entry.value.valued), f"From {entry.provenance}."]))
+
+
+def material_to_json(entry: Registered[Material]) -> dict[str, Any]:
+    """All that is known of a material; its law as that of a list of laws."""
+    return {
+        **fields_to_json(entry.value, "name title form source"),
+        "law": law_to_json(replace(entry, value=entry.value.law)),  # type: ignore[arg-type]
+        "values": dict(entry.value.values),
+        "ranges": {name: list(ends) for name, ends in entry.value.ranges.items()},
+        "covariance": [list(row) for row in entry.value.covariance],
+        "provenance": str(entry.provenance),
+    }
+
+
+IN_FULL: Mapping[kinds.PluginKind[Any], tuple[Callable[[Any], None], Callable[[Any], dict[str, Any]]]] = {
+    kinds.LAWS: (print_law, law_to_json),
+    kinds.SPECIMENS: (print_specimen, specimen_to_json),
+    kinds.MATERIALS: (print_material, material_to_json),
+}
+"""{kind: how one of it is printed in full, and as JSON}."""
 
 
 def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str]) -> None:

@@ -56,12 +56,12 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
     lines = [
         f"rates are compared at {at}; by an alloy's own tests they are known to a factor of {np.exp(noise):.2f}",
         f"stress exponents of alloys left out are predicted within {exponent.left_out_error:.2g}",
+        *_energy_lines(mapped),
         f"{round(rate.left_out_coverage * len(rate.values))} of {len(rate.values)} rates lie in the 95 % intervals "
         f"that the other alloys give them; alloys of one composition differ by {100 * np.expm1(rate.scatter):.0f} %",
         f"nearly, with atomic fractions x: ln(rate, 1/s) = {formula_text(rate)}",
     ]
-    proposals = mapped.propose()
-    lowest = min(one.rate[0] for one in proposals)
+    lowest = min(one.rate[0] for one in mapped.proposals)
     beyond = "these rates are below all that were measured: an extrapolation that only a test can confirm"
     lines += [f"left out: {name}: {why}" for name, why in mapped.left_out.items()]
     title = f"Creep rate over compositions{of}"
@@ -70,9 +70,19 @@ def composition_blocks(mapped: CompositionMap, figures: PageFigures | None = Non
         *([] if figures is None else [figures.picture(lambda: composition_figure(mapped), title, description, title)]),
         Items(lines),
         *_shared_blocks(mapped),
-        proposals_table(proposals, "the compositions to make next for the lowest creep rate"),
+        proposals_table(mapped.proposals, "the compositions to make next for the lowest creep rate"),
         *([Paragraph(beyond)] if lowest < float(np.exp(rate.values.min())) else []),
     ]
+
+
+def _energy_lines(mapped: CompositionMap) -> list[str]:
+    """How well activation energies of alloys left out are predicted, and over which range they are."""
+    energy = mapped.activation_energy
+    if energy is None:
+        return []
+    low, high = (number(float(one) / 1e3, 3) for one in (energy.values.min(), energy.values.max()))
+    error = number(energy.left_out_error / 1e3, 2)
+    return [f"activation energies, {low} to {high} kJ/mol, of alloys left out are predicted within {error} kJ/mol"]
 
 
 def formula_text(regression: CompositionRegression) -> str:
@@ -114,8 +124,11 @@ def proposals_table(proposals: Sequence[PredictedAlloy], caption: str) -> Table:
         contents = " ".join(f"{element}{content:.3g}" for element, content in one.composition.items() if content > 0.05)
         value, low, high = (number(PERCENT_PER_HOUR * rate, 2) for rate in one.rate)
         law, share = max(one.laws.items(), key=lambda pair: pair[1])
-        rows.append((contents, f"{value} [{low}, {high}]", f"{one.stress_exponent[0]:.2g}", f"{law} ({share:.2f})"))
-    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", "law"), rows)
+        energy = [] if one.activation_energy is None else [number(one.activation_energy[0] / 1e3, 3)]
+        exponent = f"{one.stress_exponent[0]:.2g}"
+        rows.append((contents, f"{value} [{low}, {high}]", exponent, *energy, f"{law} ({share:.2f})"))
+    energy = ["activation energy, kJ/mol"] if proposals and proposals[0].activation_energy else []
+    return Table(caption, ("composition, at.%", "creep rate, %/h", "stress exponent", *energy, "law"), rows)
 
 
 def composition_figure(mapped: CompositionMap) -> Figure:
@@ -160,7 +173,7 @@ def draw_map(axes: Axes, mapped: CompositionMap) -> None:
         across, up = (own[of_law] @ CORNERS).T
         axes.scatter(across, up, c=of_alloys[of_law], s=42, marker=marker, edgecolors="white", zorder=3, **colours)
         axes.scatter([], [], marker=marker, color="0.5", label=name)
-    made = np.array([[one.composition[mapped.elements[k]] for k in shown] for one in mapped.propose()])
+    made = np.array([[one.composition[mapped.elements[k]] for k in shown] for one in mapped.proposals])
     place = made / np.maximum(made.sum(axis=1, keepdims=True), 1e-9) @ CORNERS
     across, up = place.T
     axes.scatter(across, up, marker="*", s=130, color="crimson", edgecolors="white", label="to make next", zorder=4)

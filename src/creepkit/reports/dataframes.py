@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.composition.mapping import CompositionMap
+from creepkit.composition.regression import CompositionRegression
 from creepkit.errors import HistoryError, ReportError, restated
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
@@ -112,19 +113,23 @@ def _(mapped: CompositionMap) -> tuple[Any, str]:
     for k, alloy in enumerate(mapped.alloys):
         row: dict[str, Any] = {"alloy": alloy}
         row |= {f"{e}_at%": 100 * x for e, x in zip(mapped.elements, mapped.contents[k], strict=True)}
-        for name, one in (("ln_rate", mapped.log_rate), ("stress_exponent", mapped.stress_exponent)):
-            (shared, shared_sd, share), (others, others_sd) = one.shared, one.left_out
-            row |= {name: one.values[k], f"{name}_sd": one.sd[k], f"{name}_shared": shared[k]}
-            row |= {
-                f"{name}_shared_sd": shared_sd[k],
-                f"{name}_by_others": others[k],
-                f"{name}_by_others_sd": others_sd[k],
-            }
-            row[f"{name}_weight_of_others"] = share[k]
+        for name, one in mapped.regressions.items():
+            if alloy in one.alloys:
+                row |= _of_regression(name, one, one.alloys.index(alloy))
         for name, table in (("", mapped.laws.weights), ("_shared", mapped.laws.shared)):
             row |= {f"{law}{name}": p for law, p in zip(mapped.laws.laws, table[k], strict=True)}
         rows.append(row)
     return rows, "alloy"
+
+
+def _of_regression(name: str, one: CompositionRegression, k: int) -> dict[str, float]:
+    """A property of alloy k by its own tests, with the others, and by the others alone."""
+    (shared, shared_sd, share), (others, others_sd) = one.shared, one.left_out
+    values = {
+        "": one.values, "_sd": one.sd, "_shared": shared, "_shared_sd": shared_sd, "_by_others": others,
+        "_by_others_sd": others_sd, "_weight_of_others": share,
+    }  # fmt: skip
+    return {f"{name}{ending}": float(value[k]) for ending, value in values.items()}
 
 
 @_rows.register

@@ -189,7 +189,10 @@ def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
     if provenance.get("data") == dataset_fingerprint(data):
         train, rows = training_split(len(data), surrogate.recipe.training, int(provenance["seed"]))
         scale = output_deviation(samples, train)
-    return evaluate_rows(surrogate, samples, data, rows, scale)
+    network = surrogate.for_search()
+    parts = np.split(rows, range(EVALUATION_BATCH, len(rows), EVALUATION_BATCH))
+    predicted = [network.predict_samples({name: array[part] for name, array in samples.items()}) for part in parts]
+    return evaluate_rows(np.concatenate(predicted), samples, data, rows, scale)
 
 
 def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
@@ -203,14 +206,15 @@ def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
         raise DatasetError(f"the data set has the outputs {', '.join(data.outputs)}, not {', '.join(metadata.outputs)}")
 
 
-def evaluate_rows(surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats) -> Evaluation:
-    """What a network predicts for rows (n,) of a data set, beside what is true; scale : (outputs,)."""
-    parts = [rows[first : first + EVALUATION_BATCH] for first in range(0, len(rows), EVALUATION_BATCH)]
-    predicted = [surrogate.predict_samples({name: v[part] for name, v in samples.items()}) for part in parts]
+def evaluate_rows(predicted: Floats, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats) -> Evaluation:
+    """What a network predicts for rows (n,) of a data set, predicted (n, frames, outputs), beside what is true.
+
+    scale : (outputs,).
+    """
     comparison = PredictionComparison(
         times=np.stack([data.times(int(k)) for k in rows]),
         true=np.asarray(samples["targets"][rows], float),
-        predicted=np.concatenate(predicted),
+        predicted=predicted,
         mask=samples["mask"][rows],
         outputs=data.outputs,
         scale=scale,

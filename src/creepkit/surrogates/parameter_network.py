@@ -137,8 +137,11 @@ class ParameterModule(nn.Module):
         return torch.cat([constants[:, None].expand(-1, series.shape[1], -1), series], dim=-1)
 
     def standardised_outputs(self, inputs: Tensor) -> Tensor:
-        """(rows, frames, outputs) standardised, of inputs (rows, frames, inputs)."""
-        return self.head(self.network(inputs)[0])  # type: ignore[no-any-return]
+        """(rows, frames, outputs) standardised, of inputs (rows, frames, inputs), in their precision.
+
+        Under autocast the layers alone are in less.
+        """
+        return self.head(self.network(inputs)[0]).to(inputs.dtype)  # type: ignore[no-any-return]
 
     def decoded(self, raw: Tensor) -> Tensor:
         """Physical outputs (rows, frames, outputs) of standardised ones, raw (rows, frames, outputs)."""
@@ -169,7 +172,7 @@ class ParameterModule(nn.Module):
         if not self.logarithm:
             return targets
         floor = self.floor.to(targets.dtype)
-        first = torch.log((targets[..., 0] + floor).clamp(min=1e-3 * float(floor)))
+        first = torch.log(torch.maximum(targets[..., 0] + floor, 1e-3 * floor))
         return torch.cat([first[..., None], targets[..., 1:]], dim=-1)
 
 

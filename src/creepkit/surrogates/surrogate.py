@@ -38,7 +38,7 @@ from creepkit.records.loading import held_of
 from creepkit.records.presentable import Presentable
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid, specimen_conditions
-from creepkit.surrogates.network_evaluation import SampleArrays, Weights
+from creepkit.surrogates.network_evaluation import Precision, SampleArrays, Weights
 from creepkit.surrogates.parameter_gru import (
     ApplicabilityDomain,
     LawInputs,
@@ -234,14 +234,16 @@ class Surrogate(Predictor, Presentable):
     """A trained network in the place of a specimen; a records.Predictor.
 
     It predicts at the frames of its training, and between them linearly in time. recipe, weights, metadata : what it
-    was trained as, the arrays of its network, and what is known of its training.
+    was trained as, the arrays of its network, and what is known of its training. precision : of its predictions.
     """
 
     is_surrogate: ClassVar[bool] = True
 
-    def __init__(self, recipe: ParameterGru, weights: Weights, metadata: SurrogateMetadata) -> None:
-        self.recipe, self.weights, self.metadata = recipe, weights, metadata
-        self.network = recipe.network(weights, metadata)
+    def __init__(
+        self, recipe: ParameterGru, weights: Weights, metadata: SurrogateMetadata, precision: Precision = np.float64
+    ) -> None:
+        self.recipe, self.weights, self.metadata, self.precision = recipe, weights, metadata, precision
+        self.network = recipe.network(weights, metadata, precision)
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -271,7 +273,11 @@ class Surrogate(Predictor, Presentable):
     def single_threaded(self) -> Surrogate:
         """The same network in the place of a specimen that starts no threads."""
         specimen: Any = self.specimen.single_threaded()
-        return Surrogate(self.recipe, self.weights, replace(self.metadata, specimen=specimen))
+        return Surrogate(self.recipe, self.weights, replace(self.metadata, specimen=specimen), self.precision)
+
+    def for_search(self) -> Surrogate:
+        """The same network in single precision, whose rounding is far below its error."""
+        return Surrogate(self.recipe, self.weights, self.metadata, np.float32)
 
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
@@ -325,7 +331,7 @@ class Surrogate(Predictor, Presentable):
     @property
     def weight_count(self) -> int:
         """Numbers that its training fitted."""
-        return self.network.weight_count
+        return sum(array.size for name, array in self.weights.items() if name.startswith(("network.", "head.")))
 
     @property
     def error(self) -> dict[str, float]:  # type: ignore[override]

@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 from torch.optim.lr_scheduler import ReduceLROnPlateau
 
-from creepkit.arrays import Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.checked_arguments import checked
 from creepkit.dataset.dataset import Dataset, first_difference
 from creepkit.dataset.storage import read_dataset
@@ -50,8 +50,8 @@ def epochs_since_best(losses: Sequence[float]) -> int:
     return len(finite) - 1 - finite.index(min(finite)) if finite else 0
 
 
-VALIDATION_BATCH = 256
-"""Rows in a batch without gradients."""
+VALIDATION_BATCH = {"cpu": 256, "cuda": 2048}
+"""Rows in a batch without gradients: as many as a cache holds, and as fill a GPU."""
 
 
 class NetworkTraining:
@@ -75,7 +75,7 @@ class NetworkTraining:
         self.samples = {name: tensor.to(device) for name, tensor in sample_tensors(samples).items()}
         self.train, self.validation = (torch.from_numpy(part).to(device) for part in rows)
         self.training, self.seed = training, seed
-        self.adam = torch.optim.Adam(module.parameters(), lr=training.rate)
+        self.adam = torch.optim.Adam(module.parameters(), lr=training.first_rate, fused=True)
         self.plateau = ReduceLROnPlateau(self.adam, patience=training.patience, min_lr=LEAST_LEARNING_RATE)
         self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
         self.best = self._weights()
@@ -111,7 +111,7 @@ class NetworkTraining:
         if not (math.isfinite(loss) and math.isfinite(validation)):
             raise SurrogateError(
                 f"the training diverged in epoch {self.epochs + 1}: its loss is not a finite number; lower the rate "
-                f"({self.training.rate:g}) or limit the gradient with clip=1"
+                f"({self.training.first_rate:g}) or limit the gradient with clip=1"
             )
         if validation < min(self.curves["validation"], default=math.inf):
             self.best = self._weights()
@@ -132,7 +132,7 @@ class NetworkTraining:
             for k, rows in enumerate(batches):
                 if self.training.schedule == "cosine":
                     done = (self.epochs + k / len(batches)) / self.training.epochs
-                    self.adam.param_groups[0]["lr"] = self.training.rate * 0.5 * (1.0 + math.cos(math.pi * done))
+                    self.adam.param_groups[0]["lr"] = self.training.first_rate * 0.5 * (1.0 + math.cos(math.pi * done))
                 rates.append(float(self.adam.param_groups[0]["lr"]))
                 total += self._step(rows) * len(rows)
         return float(total) / len(order), rates[0]
@@ -152,13 +152,24 @@ class NetworkTraining:
         self.module.eval()
         total = torch.zeros((), dtype=torch.float64, device=self.device)
         squares = torch.zeros((), dtype=torch.float64, device=self.device)
-        for rows in torch.split(self.validation, VALIDATION_BATCH):
+        for rows in self._validation_batches():
             batch = _batch(self.samples, rows)
             loss, predicted = self.module.loss_and_outputs(batch)
             total += loss.double() * len(rows)
             errors = (predicted - batch["targets"]).double() / self._scale
             squares += torch.where(batch["mask"][..., None], errors, 0.0).square().sum()
         return float(total) / len(self.validation), float(squares) / self._total_squares
+
+    @torch.no_grad()
+    def best_outputs(self) -> Floats:
+        """(validation rows, frames, outputs) in physical units, of the best weights, which the module has from now."""
+        self.module.load_state_dict(self.best)
+        self.module.eval()
+        predicted = [self.module(_batch(self.samples, rows)).cpu() for rows in self._validation_batches()]
+        return torch.cat(predicted).double().numpy()
+
+    def _validation_batches(self) -> tuple[Tensor, ...]:
+        return torch.split(self.validation, VALIDATION_BATCH[self.device.type])
 
     def _validation_squares(self) -> float:
         """Squared deviations of the validation rows from their mean at each time."""
@@ -280,12 +291,11 @@ def train(
     checkpoint = Checkpoint(None if path is None else path.with_name(f"{path.name}.checkpoint"), request)
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
-    weights = weights_of(fit.best)
-    trained, scale = Surrogate(recipe, weights, metadata), output_deviation(samples, rows[0])
-    metrics = evaluate_rows(trained, samples, data, rows[1], scale).metrics
+    scale = output_deviation(samples, rows[0])
+    metrics = evaluate_rows(fit.best_outputs(), samples, data, rows[1], scale).metrics
     provenance = _provenance(data, rows, fit, request)
     metadata = replace(metadata, metrics=metrics, curves=fit.curves, provenance=provenance)
-    result = Surrogate(recipe, weights, metadata)
+    result = Surrogate(recipe, weights_of(fit.best), metadata)
     if path is not None:
         result.save(path)
         path.with_name(f"{path.name}.checkpoint").unlink(missing_ok=True)

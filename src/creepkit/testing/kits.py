@@ -22,12 +22,13 @@ from creepkit.instruments.column_heads import TIME_UNITS, channel_unit, time_fac
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
-from creepkit.records import CameraFormat, Exporter, History, InstrumentFormat, Predictor, Reader, Specimen
+from creepkit.records import CameraFormat, Exporter, History, InstrumentFormat, Material, Predictor, Reader, Specimen
 from creepkit.registry import Plugin, default_registry, kinds
 from creepkit.testing import (
     camera_checks,
     exporter_checks,
     law_checks,
+    material_checks,
     predictor_checks,
     reader_checks,
     specimen_checks,
@@ -211,6 +212,12 @@ def check_exporter(exporter: Exporter) -> ConformanceReport:
 def check_instrument_format(format: InstrumentFormat) -> ConformanceReport:
     """Run every check on an instrument format: its name, the units of its channels, the order of its dates."""
     return _report(format, "instrument format", [check_declaration])
+
+
+@checked
+def check_material(material: Material) -> ConformanceReport:
+    """Run every check on a published law of a material: its source, values and range, and the rates within it."""
+    return _report(material, "material", material_checks)
 
 
 def _report(subject: Any, kind: str, checks: ModuleType | list[Any], *further: Any) -> ConformanceReport:

@@ -112,6 +112,37 @@ def test_a_map_predicts_and_proposes_alloys_of_labelled_tests(alloys, tmp_path):
     assert "Creep over compositions" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_activation_energies_are_mapped_over_the_alloys_that_have_several_temperatures(alloys):
+    """Q = 250 + 2 at.% Ni kJ/mol in nine of ten alloys; one has a single temperature, at which rates are compared."""
+    fits, tests = alloys
+    rng, law = np.random.default_rng(7), ck.law("norton").times(ck.arrhenius(T_ref=1073.15))
+    both = {}
+    for k, (name, own) in enumerate(tests.items()):
+        nickel = compositions_of_labels(tests).atomic[name]["Ni"]
+        factor = np.exp(-(250e3 + 2e3 * nickel) / 8.314462618 * (1 / 1023.15 - 1 / 1073.15))
+        colder = [
+            one.replace(
+                name=f"{one.name} 1023", temperature=1023.15,
+                minimum_rate=float(one.minimum_rate * factor * np.exp(0.03 * rng.normal())),
+            )
+            for one in own
+        ]  # fmt: skip
+        both[name] = ck.identify(law, own + colder) if k else fits[name]
+    mapped = ck.composition_map(both, temperature=1073.15)
+    found = mapped.predict({"Ni": 40.0, "Fe": 60.0})
+    assert len(mapped.activation_energy.values) == 9
+    assert found.activation_energy[1] < 330e3 < found.activation_energy[2]
+    assert found.activation_energy[0] == pytest.approx(330e3, abs=10e3)
+    assert "activation energies" in str(mapped)
+    assert mapped.to_dataframe()["activation_energy"].isna().sum() == 1
+    assert ck.composition_map(fits).activation_energy is None
+    colder = ck.composition_map(both, temperature=1023.15)
+    assert "its tests were at 800 °C: nothing is known of 750 °C" in colder.left_out["A0"]
+    factor = np.exp(-330e3 / 8.314462618 * (1 / 1023.15 - 1 / 1073.15))
+    rate = colder.predict({"Ni": 40.0, "Fe": 60.0}).rate
+    assert rate[1] < np.exp(-19.0) * (colder.point["stress"] / 100.0) ** 4.8 * factor < rate[2]
+
+
 def test_what_a_map_cannot_say_is_one_sentence(alloys):
     fits, tests = alloys
     known = compositions_of_labels(tests)
@@ -120,6 +151,7 @@ def test_what_a_map_cannot_say_is_one_sentence(alloys):
     for call, said in (
         (lambda: ck.composition_map({"A0": fits["A0"].with_histories(unlabelled)}), "give compositions="),
         (lambda: ck.composition_map(dict([*fits.items()][:5]), known), "5 alloys have a law and a composition; 8 are"),
+        (lambda: ck.composition_map(fits, known, stress=-5.0), "stress"),
         (lambda: mapped.predict({"Ni": 40.0, "Mo": 60.0}), "the alloys of the map hold no Mo"),
         (lambda: mapped.predict({"Ni": 40.0}), "add up to 40 %"),
         (lambda: mapped.propose(within={"Ni": (1.0, 2.0), "Fe": (1.0, 2.0)}), "widen `within`"),

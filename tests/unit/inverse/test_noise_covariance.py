@@ -201,6 +201,15 @@ def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse(correlat
     assert factor.log_determinant == pytest.approx(np.linalg.slogdet(c)[1].sum(), rel=1e-10)
 
 
+@pytest.mark.parametrize("correlated", [False, True])
+def test_standard_deviations_are_those_of_the_covariance(correlated):
+    residuals, noise = example(correlated=correlated)
+    common = np.random.default_rng(1).normal(size=(*residuals.values.shape, 2)) * residuals.present[..., None]
+    factor = CovarianceFactor.of_residuals(replace(residuals, common_effects=common), noise)
+    whole = np.diagonal(factor.blocks, axis1=1, axis2=2) + (common**2).sum(axis=-1)
+    np.testing.assert_allclose(factor.standard_deviations**2, whole, rtol=1e-9)
+
+
 def test_correlated_noise_at_a_correlation_of_zero_is_no_other():
     """The states by frame and by output give one likelihood."""
     residuals, noise = example(frames=9)

@@ -70,6 +70,24 @@ def test_values_and_derivatives_are_those_of_torch(logarithm: bool) -> None:
     assert not logarithm or (0 < bounded.mean() < 1 and (slopes[..., 0, :][bounded] == 0).all())
 
 
+@pytest.mark.parametrize("logarithm", [False, True])
+def test_single_precision_is_double_to_its_rounding(logarithm: bool) -> None:
+    module = module_of(logarithm=logarithm)
+    weights, (constants, series) = weights_of(module.state_dict()), inputs(6, 2)
+    directions = np.random.default_rng(2).normal(size=(6, 4, CONSTANTS))
+    single, double = (
+        ParameterNetwork.from_weights(weights, SIZES, (HIDDEN, LAYERS), logarithm=logarithm, precision=precision)
+        for precision in (np.float32, np.float64)
+    )
+    for rounded, exact in zip(
+        single.outputs_with_derivatives(constants, series, directions),
+        double.outputs_with_derivatives(constants, series, directions),
+        strict=True,
+    ):
+        assert rounded.dtype == np.float64
+        assert 0 < np.abs(rounded - exact).max() < 3e-6 * np.abs(exact).max()
+
+
 @pytest.mark.parametrize("rows", [1, 600])
 def test_batches_of_rows_are_one(rows: int) -> None:
     module = module_of()

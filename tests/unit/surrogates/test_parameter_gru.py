@@ -102,6 +102,15 @@ def test_candidates_and_tests_are_predicted_as_one_by_one(learnt: Surrogate, ten
         assert batch[c, t] == pytest.approx(alone, rel=1e-12)
 
 
+def test_a_search_goes_through_the_network_in_single_precision(learnt: Surrogate, tension: Dataset) -> None:
+    tests, single = [tension.planned_test(k) for k in range(5)], learnt.for_search().single_threaded()
+    theta = tension.law.to_internal(tension.parameters[:40])
+    exact, rounded = (one.predict(tension.law, theta, tests).values for one in (learnt, single))
+    difference = np.abs(rounded - exact)
+    assert 0 < difference.max() < 1e-5 * np.abs(exact).max()
+    assert difference.max() < 1e-3 * learnt.error["strain"]
+
+
 def test_frames_of_the_training_are_predicted_as_in_training(learnt: Surrogate, tension: Dataset) -> None:
     samples = sample_tensors(learnt.recipe.sample_arrays(tension))
     module = learnt.recipe.module(tension, samples, torch.arange(100))

@@ -17,6 +17,7 @@ from creepkit.surrogates.evaluation import (
     relative_squared_error,
 )
 from creepkit.surrogates.parameter_gru import ParameterGru, Training
+from creepkit.surrogates.surrogate import load_surrogate
 from creepkit.surrogates.training import epochs_since_best, train
 from helpers.mistakes import said_otherwise
 from helpers.planted_datasets import bars
@@ -70,6 +71,15 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
         train(data, SMALL, to=path, seed=4)
 
 
+def test_the_rate_grows_with_the_root_of_the_batch_unless_it_is_given(data: Dataset) -> None:
+    for training, rate in (
+        (Training(epochs=1, batch=64), 1e-3),
+        (Training(epochs=1, batch=1024, schedule="cosine"), 4e-3),
+        (Training(epochs=1, batch=1024, rate=2e-4), 2e-4),
+    ):
+        assert train(data, SMALL, training=training).metadata.curves["rate"] == [pytest.approx(rate, rel=1e-12)]
+
+
 def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
     model = train(data, SMALL, training=Training(epochs=50, rate=0.5, schedule="constant", early_stop=3))
     losses, known = model.metadata.curves["validation"], model.metadata.provenance
@@ -84,8 +94,12 @@ def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
 def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_path: Path) -> None:
     model = train(data, SMALL, to=tmp_path / "m.safetensors", training=Training(epochs=40, rate=2e-2, batch=16))
     assert model.metadata.metrics["loss"] < 0.25
-    judged = evaluate(model, data)
-    assert judged.metrics == model.metadata.metrics
+    judged = evaluate(load_surrogate(tmp_path / "m.safetensors"), data)
+    assert judged.metrics == evaluate(model, data).metrics
+    # by torch on the device of the training, and by NumPy, both in single precision
+    by_numpy, by_torch = (metrics["outputs"]["strain"] for metrics in (judged.metrics, model.metadata.metrics))
+    assert by_numpy == pytest.approx(by_torch, rel=2e-5)
+    assert judged.metrics["loss"] == pytest.approx(model.metadata.metrics["loss"], rel=2e-5)
     assert len(judged.comparison.true) == round(0.2 * len(data))
     assert judged.times == (6250.0, 18750.0, 31250.0)
 

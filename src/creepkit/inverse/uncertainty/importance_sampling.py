@@ -41,7 +41,8 @@ from creepkit.records import Predictor
 from creepkit.records.presentable import Presentable, Tabulated
 
 ROUNDS, MOST_ROUNDS = 4, 12
-"""Of proposals: at least, and where the samples are still worth too few."""
+"""Of proposals: at least, to which those end whose density takes predictions where nobody asked for samples; and where
+the samples are still worth too few."""
 
 
 DRAWS, MOST_DRAWS = 256, 4096
@@ -95,7 +96,8 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     posterior = Posterior.from_identification(replace(fit, problem=problem))
     centre, seed, shape = np.array(fit.u), fit.settings.seed, _first_shape(fit, posterior)
     samples = _samples_by_quadratic_residuals(posterior, centre, shape, seed)
-    samples = posterior_samples(posterior, centre, shape, seed) if samples is None else samples
+    if samples is None:
+        samples = posterior_samples(posterior, centre, shape, seed, rounds=ROUNDS)
     if samples is None:
         return replace(fit, notes=(*fit.notes, NOT_SAMPLED))
     return replace(fit, samples=samples)
@@ -200,7 +202,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
         return None
     for k, points in enumerate(JUDGED_POINTS):
         residuals, rate_effect, *slopes = (posterior.residuals if k else posterior.residuals_and_jacobian)(judged)
-        exact = posterior.log_density(residuals, rate_effect)
+        exact = posterior.log_density(judged, residuals, rate_effect)
         if k and float(np.std(exact - density(judged))) < LARGEST_ERROR:
             return samples
         usable = np.isfinite(exact) & np.isfinite(residuals).all((1, 2))
@@ -219,7 +221,7 @@ def _samples_by_quadratic_residuals(posterior: Posterior, centre: Floats, shape:
             return None
         samples, judged = found, found[:: len(found) // points][:points]
     further, further_effect = posterior.residuals(judged)
-    errors = posterior.log_density(further, further_effect) - density(judged)
+    errors = posterior.log_density(judged, further, further_effect) - density(judged)
     return _resampled(judged, errors, LEAST_EFFECTIVE_SIZE, SAMPLES)
 
 
@@ -268,18 +270,19 @@ def posterior_samples(
     *,
     draws: int = SAMPLES,
     least: float = LEAST_EFFECTIVE_SIZE,
+    rounds: int = MOST_ROUNDS,
 ) -> Floats | None:
     """(draws, parameters) conditioned coordinates of equal weight; None where too few of those tried count.
 
     density : ln p (candidates,), but for a constant, of u (candidates, parameters).
     centre : (parameters,) of the first proposal. shape : (parameters, parameters) its covariance. least : effective
-    number of draws at which it ends.
+    number of draws at which it ends. rounds : at most.
     """
     size = centre.size
     smallest = 1e-6 * np.diag(np.diag(shape))
     points, log_density = np.zeros((0, size)), np.zeros(0)
     proposals: list[tuple[Floats, Floats]] = []
-    for k in range(MOST_ROUNDS):
+    for k in range(rounds):
         proposals.append((centre, shape))
         drawn = _drawn(centre, shape, seed + k)
         points = np.concatenate([points, drawn])

@@ -6,7 +6,12 @@ degrees of freedom of that covariance and K parameters
     ln p(u) = -(nu + K) / 2 ln(1 + (chi2(u) - least chi2) / nu),
 
 the multivariate Student's t (Box & Tiao (1973), Bayesian Inference in Statistical Analysis, 2.7); -chi2(u) / 2 for
-large nu. Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened
+large nu. Values that are found under weights 1 / W in the place of the inverse covariance are not where that chi2 is
+least, and what W says of their spread is wrong. Of them ln p is that of the estimator: chi2_W counts from its least
+value beyond any bound, w, as it is linearised, and times (d'G d) / (d'H d), d = u - w, with H its own curvature and
+G^-1 the covariance of the estimator (Chandler & Bate (2007), Biometrika 94, 167).
+
+Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened
 residuals at the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2,
 J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate.
 
@@ -27,6 +32,9 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.perturbations import errors_of_tests, with_expected_scatter
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
+from creepkit.inverse.uncertainty.laplace_approximation import covariance_of_values
+from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 
 OPTIMUM_TOLERANCES = Tolerances(gain=1e-2)
 """Of the least chi-square, from which ln p is counted: what it is off by shifts all of it, but for Student's t."""
@@ -127,6 +135,25 @@ def quadratic_terms(parameters: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
+class EstimatorInformation:
+    """What values found under weights are known to, and what these weights alone say of it.
+
+    optimum : (parameters,) u, of the problem made linear, beyond any bound. own, weighted : (parameters, parameters)
+    G, the inverse of the estimator's covariance, and H, half the second derivatives of chi-square under the weights.
+    """
+
+    optimum: Floats
+    own: Floats
+    weighted: Floats
+
+    def ratio(self, u: Floats) -> Floats:
+        """(candidates,) of the information on u (candidates, parameters) to that which the weights say."""
+        distance = u - self.optimum
+        own, weighted = (np.einsum("ci,ij,cj->c", distance, one, distance) for one in (self.own, self.weighted))
+        return np.asarray(np.divide(own, weighted, out=np.ones(len(u)), where=weighted > 0.0))
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """ln p, but for a constant, of candidates u.
 
@@ -136,6 +163,7 @@ class Posterior:
     nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
     degrees_of_freedom : nu. optimum : (parameters,) u, of least_chi_square. errors : (tests, observations) -, what the
     errors of the tests did to the residuals. quadratic : residuals as functions of u, in the place of predictions.
+    information : of values that were found under weights; None of those by likelihood.
     """
 
     problem: LeastSquaresProblem
@@ -150,11 +178,16 @@ class Posterior:
     least_chi_square: float
     errors: Floats | float = 0.0
     quadratic: QuadraticResiduals | None = None
+    information: EstimatorInformation | None = None
 
     @classmethod
     def from_identification(cls, fit: Identification) -> Posterior:
         """The posterior of an identification, about its optimum, given what the errors of its tests are there."""
-        problem, noise_model = fit.least_squares_problem, fit.noise_model
+        problem, linear, weighting = fit.least_squares_problem, fit.linear_problem, None
+        if fit.settings.weights != "likelihood":
+            estimator = WorkingNoiseEstimator(fit.settings, problem.observations)
+            weighting = estimator.weighting(estimator.estimate(linear, estimator.initial()))
+        noise_model = weighting or fit.noise_model
         residuals, nuisances, count = problem.residuals(fit.x), problem.nuisance_parameters, fit.u.size
         e = fit.x[count:]
         factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
@@ -162,7 +195,6 @@ class Posterior:
         root_precision = np.diag(np.sqrt(nuisances.precision))
         nuisance_jacobian = _whitened(factor, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
         nuisance_rows = nuisance_jacobian[:, problem.observations.present].T
-        all_noise = CovarianceFactor.of_residuals(residuals, noise_model)
         found = cls(
             problem=problem.with_fixed_nuisances(e),
             rate_sd=noise_model.rate,
@@ -175,12 +207,21 @@ class Posterior:
             optimum=fit.u,
             least_chi_square=0.0,
         )
-        if fit.error_covariance is None or fit.settings.weights != "likelihood":
+        all_noise, information = CovarianceFactor.of_residuals(residuals, noise_model), None
+        if weighting is None and fit.error_covariance is None:
             whole = problem.with_covariance(all_noise)
             x = whole.minimise(fit.x, tolerances=OPTIMUM_TOLERANCES).x
             return replace(found, optimum=x[:count], least_chi_square=whole.chi_square(x))
-        found = replace(found, errors=predicted_errors(fit, all_noise))
-        return replace(found, least_chi_square=float(found.chi_square(*found.residuals(fit.u[None]))[0]))
+        if weighting is None:
+            found = replace(found, errors=predicted_errors(fit, all_noise))
+        least = float(found.chi_square(*found.residuals(fit.u[None]))[0])
+        if weighting is not None:
+            solution = linear.whole.solve(all_noise)
+            step, own = solution.step[:count], covariance_of_values(linear, fit.noise_model, weighting)
+            covariances = [c[:count, :count] for c in (own, solution.covariance)]
+            information = EstimatorInformation(fit.u + step, *map(scaled_inverse, covariances))
+            least -= float(step @ information.weighted @ step)
+        return replace(found, least_chi_square=least, information=information)
 
     @property
     def lower(self) -> Floats:
@@ -196,16 +237,19 @@ class Posterior:
         """(candidates,) ln p of u (candidates, parameters), in one prediction; -inf outside the bounds."""
         log_density, is_inside = np.full(len(u), -np.inf), self.inside(u)
         if is_inside.any():
-            log_density[is_inside] = self.log_density(*self.residuals(u[is_inside]))
+            log_density[is_inside] = self.log_density(u[is_inside], *self.residuals(u[is_inside]))
         return log_density
 
-    def log_density(self, residuals: Floats, rate_effect: Floats) -> Floats:
-        """(candidates,) ln p of candidates within the bounds, but for a constant.
+    def log_density(self, u: Floats, residuals: Floats, rate_effect: Floats) -> Floats:
+        """(candidates,) ln p of u (candidates, parameters) within the bounds, but for a constant.
 
         residuals, rate_effect : (candidates, tests, observations) as residuals() gives them.
         """
         chi_square, count = self.chi_square(residuals, rate_effect), self.problem.parameter_count
-        rise = np.maximum(chi_square - self.least_chi_square, -0.5 * self.degrees_of_freedom)
+        rise = chi_square - self.least_chi_square
+        if self.information is not None:
+            rise *= self.information.ratio(u)
+        rise = np.maximum(rise, -0.5 * self.degrees_of_freedom)
         log_density = -0.5 * (self.degrees_of_freedom + count) * np.log1p(rise / self.degrees_of_freedom)
         return np.where(np.isfinite(log_density), log_density, -np.inf)
 

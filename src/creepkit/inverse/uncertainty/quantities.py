@@ -221,13 +221,15 @@ def local_exponent(
     return lambda u: (above(u) - below(u)) / (2 * np.log(EXPONENT_STRESS_RATIO))
 
 
-def activation_energy(coordinates: Coordinates, stress: ArrayLike, temperature: float) -> CoordinateFunction:
+def activation_energy(
+    coordinates: Coordinates, stress: ArrayLike, temperature: float, **state: ArrayLike | None
+) -> CoordinateFunction:
     """The activation energy -R d ln rate / d(1/T), J/mol, at points.
 
-    stress : number or (points,) MPa. temperature : one, K.
+    stress : number or (points,) MPa. temperature : one, K. state : strain and time, numbers or (points,).
     """
     ends = (temperature / ENERGY_TEMPERATURE_RATIO, temperature * ENERGY_TEMPERATURE_RATIO)
-    colder, hotter = (log_rate(coordinates, stress, end) for end in ends)
+    colder, hotter = (log_rate(coordinates, stress, end, **state) for end in ends)
     return lambda u: GAS_CONSTANT * (hotter(u) - colder(u)) / (1 / ends[0] - 1 / ends[1])
 
 

@@ -9,6 +9,7 @@ from scipy.stats import beta, multivariate_normal, truncnorm
 from scipy.stats import t as student
 
 from creepkit.inverse.identify import identify, sampled_where_needed
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.importance_sampling import (
     SAMPLES,
@@ -223,6 +224,27 @@ def test_values_inside_their_bounds_need_none():
     fit = sampled_where_needed(identify(NORTON, steady_tests(), Steady(), settings=SETTINGS))
     assert not needs_samples(fit)
     assert fit.samples is None
+
+
+def test_values_found_under_weights_scatter_as_their_estimator_does():
+    """Ordinary least squares of tests whose rates scatter by 0.3: n beyond its bound is a truncated normal.
+
+    Their covariance is (0.3^2 + 0.02^2 / 10) (X'X)^-1; readings alone would say 0.02^2 / 10 (X'X)^-1.
+    """
+    stresses, scatter, noise = np.geomspace(30.0, 80.0, 10), 0.3, 0.02
+    made = measured(NORTON, {**TRUTH, "n": 4.1}, stresses, sd=noise, seed=3)
+    off = scatter * np.random.default_rng(4).standard_normal(10)
+    made = [h.replace(outputs={"amplitude": h.outputs["amplitude"] + b}) for h, b in zip(made, off, strict=True)]
+    settings = replace(SETTINGS, weights="equal")
+    fit = identify(BOUNDED, made, LogRates(), settings=settings)
+    known = NoiseModel({"amplitude": OutputNoise(noise=noise)}, rate=scatter)
+    rows = np.stack([np.ones(10), np.log(stresses)], axis=1)
+    means = [(h.outputs["amplitude"] - h.times / 1e5).mean() for h in made]
+    best = np.linalg.lstsq(rows, np.array(means), rcond=None)[0][1]
+    sd = np.sqrt((scatter**2 + noise**2 / 10) * np.linalg.inv(rows.T @ rows)[1, 1])
+    found = sample_posterior(replace(fit, noise_model=known, freedom=1e9), seed=1).values["n"]
+    truth = truncnorm((1.0 - best) / sd, (4.0 - best) / sd, best, sd)
+    np.testing.assert_allclose(np.quantile(found, PROBABILITIES), truth.ppf(PROBABILITIES), atol=0.12 * truth.std())
 
 
 @dataclass(frozen=True)
