@@ -28,7 +28,7 @@ BUDGET = {
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
-    "instruments": 1158,
+    "instruments": 1159,
     "integration": 779,
     "inverse": 9514,
     "jobs": 245,
@@ -38,8 +38,8 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 6525,
-    "records": 2467,
+    "readers": 6982,
+    "records": 2469,
     "registry": 615,
     "reports": 6564,
     "rupture_assessment": 1825,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_798
+TESTS = 30_972
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
