@@ -259,7 +259,8 @@ class StatedConditions:
             misspelt = self._misspelt(key) if key.strip() else ""
             says_end = kind_of_column(key) in (*FIRM, "remark") and not misspelt.startswith("rupture_")
             near = self.terms.suggestion(key) or self.terms.suggestion(base)
-            if columns_as_labels and not (says_end or misspelt) and near and is_number(entry.text, Dialect(decimal=entry.decimal)):
+            is_asked = columns_as_labels and near and not (says_end or misspelt)
+            if is_asked and is_number(entry.text, Dialect(decimal=entry.decimal)):
                 near = f"{base}_mm" if base in self.terms.dimensions else near
                 what = (
                     f"'{quoted(key, 60)}' holds numbers and is no known name; did you mean '{near}', or is it a label?"
