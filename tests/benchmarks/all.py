@@ -57,6 +57,7 @@ BENCHMARKS = {
     "reduced_order_model": Benchmark(2),
     "calculix": Benchmark(3, (("N3", "TH", "c3"),), "CalculiX (ccx)"),
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
+    "verify_umat": Benchmark(20, (("--longest", "300", "150"),), "as of verify_export"),
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
     "javascript_runtime": Benchmark(5, needs="node"),
     "clock_alignment": Benchmark(15, (("--tests", "20"),), DATA),
