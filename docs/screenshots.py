@@ -89,7 +89,11 @@ def main() -> None:
 
 def reduced(png: bytes) -> bytes:
     """A picture in few colours."""
-    picture = Image.open(io.BytesIO(png)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    picture = (
+        Image.open(io.BytesIO(png))
+        .convert("RGB")
+        .quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    )
     stream = io.BytesIO()
     picture.save(stream, "PNG", optimize=True)
     if stream.tell() > MOST_BYTES:

@@ -17,20 +17,20 @@ BUDGET = {
     "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2149,
+    "cli": 2151,
     "composition": 411,
     "core": 67,
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2739,
+    "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
-    "instruments": 1158,
+    "instruments": 1159,
     "integration": 779,
-    "inverse": 9399,
+    "inverse": 9402,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -38,21 +38,21 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 6525,
-    "records": 2467,
+    "readers": 6983,
+    "records": 2469,
     "registry": 615,
-    "reports": 6595,
+    "reports": 6690,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2770,
-    "surrogates": 1384,
+    "studies": 2785,
+    "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_404
+TESTS = 30_978
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

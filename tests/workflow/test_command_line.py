@@ -57,7 +57,7 @@ def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tm
     for end in (one.rupture for one in tests):
         assert end.measured < end.predicted if end.censored else end.low < end.measured < end.high
     assert re.search(
-        r"\buse strain-hardening: on average it fits .*\n.*\n  decisive; weight 1.00 among 3 laws\n", simulated
+        r"\buse strain-hardening for .* on average it fits .*\n.*\n  decisive; weight 1.00 among 3 laws\n", simulated
     )
     assert len(re.findall(r" yes$", simulated.split("the truth: strain-hardening")[1], re.MULTILINE)) == 3
     assert re.search(r"time: \d+ s", simulated)

@@ -81,14 +81,16 @@ def print_result(result: StudyResult) -> None:
     for line in lines[:MOST_FIGURES]:
         tell(line)
     rankings = result.rankings
+    name = "ranking.json" if len(rankings) == 1 else f"{next(iter(rankings), '')}_ranking.json"
+    path = None if result.folder is None else result.folder / name
     for ranking in [*rankings.values()][: len(rankings) == 1]:
-        tell(answer_text(ranking.best, ranking, result.report))
+        design = next(iter(result.designs.values()), None)
+        tell(answer_text(ranking.best, ranking, result.report or f"creepkit report {path}", design=design))
     if len(rankings) > 1:
         tell(as_text([table_of_groups({name: (one.best, one.decisive) for name, one in rankings.items()})]))
     if result.report is not None:
         tell(f"report: {result.report}")
-    if rankings and result.folder is not None:
-        path = result.folder / ("ranking.json" if len(rankings) == 1 else f"{next(iter(rankings))}_ranking.json")
+    if rankings and path is not None:
         tell(f"laws: {path}; forecast: creepkit predict {path} {_test_as_options(next(iter(rankings.values())).best)}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -101,6 +102,34 @@ def exported_text(exporter: Exporter, source: LawWithValues) -> str:
     if not isinstance(text, str):
         raise ExportError(f"{what} returned a {type(text).__name__}; it must return a str")
     return text
+
+
+PROGRAMS: Mapping[str, Mapping[str, str]] = {
+    "Abaqus": {
+        "abaqus-cards": "*CREEP",
+        "abaqus": "*CREEP, LAW=USER with a subroutine",
+        "mfront": "an MFront behaviour",
+    },
+    "CalculiX": {
+        "calculix-cards": "*CREEP",
+        "calculix": "*CREEP, LAW=USER with a subroutine",
+        "mfront": "an MFront behaviour",
+    },
+    "Ansys": {"ansys": "TB,CREEP", "abaqus": "a subroutine USERCREEP"},  # which is given what CREEP is
+}
+"""{finite element code: {target: how the line of its creep law begins, or what it needs}}, the simplest first."""
+
+
+def input_of_programs(source: Valued) -> dict[str, str]:
+    """{finite element code: the line of its own creep law where the law is one, else the routine that it needs}."""
+    found: dict[str, str] = {}
+    for program, targets in PROGRAMS.items():
+        for target, needed in targets.items():
+            with suppress(ExportError):
+                text = exported_text(default_registry().one(kinds.EXPORTERS, target), source.valued)
+                found[program] = next((one for one in text.splitlines() if one.startswith(needed)), needed)
+                break
+    return found
 
 
 def _units(units: Units | Mapping[str, str]) -> Units:

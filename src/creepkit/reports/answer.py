@@ -14,9 +14,8 @@ import numpy as np
 from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
-from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
+from creepkit.exporters.exporting import input_of_programs
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
-from creepkit.inverse.nuisance_parameters import beyond_intervals
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
@@ -24,44 +23,39 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
-from creepkit.reports.blocks import (
-    MOST_NAMED,
-    Answer,
-    Cell,
-    Rich,
-    Table,
-    as_text,
-    listed,
-    named,
-    number,
-    plural,
-    printable,
-)
-from creepkit.reports.description import headline_role, rejected, tested_range, tests_text
+from creepkit.reports.blocks import MOST_NAMED, Answer, Cell, Rich, Table, as_text, listed, number, plural, printable
+from creepkit.reports.cautions import cautions
+from creepkit.reports.description import headline_role, mean_misfit_text, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
-from creepkit.reports.remarks import challenge_text, combined_change_text, nuisance_text
-from creepkit.reports.verdicts import cause_caution, cause_headline, same_functions, unmet_text, verdict_text
-from creepkit.reports.words import BRACKETS, CAUTIONS, CONSTANT_LOAD, FORECAST, NEW_TEST, REASONS
+from creepkit.reports.verdicts import same_functions, verdict_text
+from creepkit.reports.words import (
+    BRACKETS,
+    CODES,
+    CONSTANT_LOAD,
+    DESIGN,
+    FORECAST,
+    MEAN_SLOPE,
+    MORE_CODES,
+    NEW_TEST,
+    OTHER_N,
+    OVER_ALL_TESTS,
+)
 
 if TYPE_CHECKING:
+    from creepkit.experiments.planned_design import Design
     from creepkit.forecasts.forecast import Forecast
     from creepkit.forecasts.forecast_of_test import TestForecast, TimeForecast
-    from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
-    from creepkit.language import CreepLaw, Param
+    from creepkit.language import CreepLaw
     from creepkit.quality.flags import DataQuality
     from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 
 MOST_CAUTIONS = 3
 """On the first screen and in a terminal; the others stand in the details."""
-
-
-AT_BOUND, WIDER_RATIO = 1e-3, 1e3
-"""Of the width of a search: so near to its end a value is held there; and by what a bound of a logarithm is moved."""
 
 
 MOST_ASKED = 4
@@ -78,10 +72,6 @@ OTHER_MEDIAN = 0.05
 
 LEAST_WEIGHT = 0.01
 """Of a law that is named beside the best."""
-
-
-NOTEWORTHY_EXPONENT = 0.15
-"""Of the stress exponent, by which leaving out one test changes it, from which on this is said."""
 
 
 BEYOND = {"h": "later", "%": "ruptured"}
@@ -118,7 +108,7 @@ class KeyFigure:
     def text(self) -> str:
         """Value, interval and unit; of an exponent or energy whose interval is wider than itself the interval alone."""
         said = interval_text((self.value, self.low, self.high), self.unit)
-        if not (self.name.endswith(SLOPES) and self.high - self.low > self.value):
+        if not (self.name in SLOPES and self.high - self.low > self.value):
             return said
         return (
             f"{NOT_DETERMINED} [{number(max(self.low, 0.0), 2)}, {number(self.high, 2)}]{self.unit and ' '}{self.unit}"
@@ -127,7 +117,7 @@ class KeyFigure:
 
 def _written_out(value: float, digits: int) -> str:
     """A number without a power of ten where it has a usual size, such as 2930 h."""
-    if not 1e3 <= abs(value) < 1e6:
+    if not 10.0**digits <= abs(value) < 1e6:
         return number(value, digits)
     return f"{float(f'{value:.{digits}g}'):.0f}"
 
@@ -141,11 +131,12 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
     (measured, half, predicted), (heat, error, _) = slopes
     of_heat = (heat, heat - error, heat + error)
-    by_rates = _with_interval("measured activation energy", tested_range(fit), of_heat, 1e-3, "kJ/mol")
+    where = f"{OVER_ALL_TESTS}, {tested_range(fit)}"
+    by_rates = _with_interval("activation energy", where, of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
-        found = [KeyFigure("measured stress exponent", tested_range(fit), *interval, remark=by_law), *_lives(fit)]
+        found = [KeyFigure("stress exponent", where, *interval, remark=by_law), *_lives(fit)]
         return [one for one in (*found, by_rates) if math.isfinite(one.value)]
     r = fit.tested_point
     of_state = ""
@@ -153,10 +144,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    by_tests = f"{measured:.2g} over all tests" if math.isfinite(measured) else ""
+    by_tests = MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = f"{by_rates.text} over all tests" if math.isfinite(heat) else ""
+        by_tests = MEAN_SLOPE.format(value=by_rates.text) if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
@@ -262,136 +253,6 @@ def _of_mean(name: str, at: str, value: Any, unit: str, one: Any) -> KeyFigure:
     return KeyFigure(name, f"{celsius_text(one.temperature, digits=0)}, {at}", value, low, high, unit, remark)
 
 
-# ---- cautions --------------------------------------------------------------------------------------------------------
-
-
-def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQuality | None = None) -> list[str]:
-    """What to mind, the most serious first, a sentence each without a full stop."""
-    others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
-    choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
-    of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
-    return list(dict.fromkeys([*of_law, *(_held(others) if rejected(fit) else ()), *_data(quality)]))
-
-
-def _of_tests(fit: Identification) -> Iterator[str]:
-    """Tests that do not agree with all others, with the error that would make it."""
-    found = fit.adequacy.explanations[:1] if fit.adequacy is not None else ()
-    yield from (
-        cause_caution(one) if one.kind == "one test" else cause_headline(one) for one in found if not one.is_of_law
-    )
-
-
-def _held(fits: Sequence[Identification]) -> Iterator[str]:
-    """A law that a bound of the search keeps from the tests, and how to move it; what is physical is no such bound."""
-    for one in fits:
-        for name, param in one.law.table.items():
-            low, high = (param.to_internal(end) for end in param.bounds)
-            value = param.to_internal(one.values[name]) if name in one.values else math.nan
-            free = [end not in (param.limits or ()) and end not in (0.0, param.off) for end in param.bounds]
-            for at_upper, distance in ((False, value - low), (True, high - value)):
-                if distance <= AT_BOUND * (high - low) and free[at_upper]:
-                    yield _bound_text(one.law.name, name, param, at_upper=at_upper)
-                    return
-
-
-def _bound_text(law: str, name: str, param: Param, *, at_upper: bool) -> str:
-    low, high = param.bounds
-    bound = high if at_upper else low
-    further = WIDER_RATIO if param.scale == "log" else 2.0
-    if at_upper:
-        high = high * further if high > 0 else high + (high - low)
-    else:
-        low = low / further if low > 0 else low - (high - low)
-    wider = f"bounds = {{ {name} = [{number(low)}, {number(high)}] }}"
-    end = "upper" if at_upper else "lower"
-    return CAUTIONS["held"].format(law=law, name=name, value=number(bound), end=end, wider=wider)
-
-
-RUNAWAY = 1.0
-"""Strain above what was measured, from which on a law has broken before the test."""
-
-
-def _contradictions(fit: Identification) -> Iterator[str]:
-    """What keeps the law from describing the tests."""
-    adequacy = fit.adequacy
-    if not fit.converged:
-        yield CAUTIONS["not converged"]
-    if adequacy is None:
-        yield CAUTIONS["unknown"]
-        return
-    if adequacy.unpredicted:
-        yield CAUTIONS["unpredicted"].format(tests=named(adequacy.unpredicted, "test"))
-    for k, reason in enumerate(_reasons(fit, adequacy)):
-        yield reason if k else CAUTIONS["rejected"].format(reason=reason)
-    if adequacy.mentioned is not None:
-        yield cause_caution(adequacy.mentioned)
-    if adequacy.remedies and not adequacy.explanations:
-        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
-    yield from (CAUTIONS["implausible"].format(nuisance=nuisance_text(one)) for one in adequacy.implausible[:1])
-    if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
-        yield CAUTIONS["noise unknown"]
-
-
-def _reasons(fit: Identification, adequacy: Adequacy) -> list[str]:
-    """Why the tests reject the law; none where they do not, or where what it misses lies in some of them."""
-    if not adequacy.rejects or adequacy.lies_in_tests:
-        return []
-    found = [REASONS["two exponents"]] * (adequacy.contradicting is not None)
-    if adequacy.is_explained:
-        found.append(REASONS["cause"].format(cause=cause_headline(adequacy.explanations[0])))
-    if adequacy.misses_shape() and adequacy.largest is not None:
-        worst = adequacy.largest
-        factor, unit = (100.0, "% (absolute)") if is_logarithmic(worst.output) else (1.0, output_unit(worst.output))
-        what, amount = worst.output.replace("_", " "), f"{factor * abs(worst.deviation):.2g} {unit}".strip()
-        side, at = "large" if worst.deviation > 0 else "small", time_text(worst.time)
-        kind = "runs away" if is_logarithmic(worst.output) and worst.deviation > RUNAWAY else "worst"
-        found.append(REASONS[kind].format(test=_test(fit, worst.test), what=what, amount=amount, side=side, time=at))
-    return found or [REASONS["noise"]]
-
-
-def _test(fit: Identification, name: str) -> str:
-    """A test with its temperature and load."""
-    condition = next((one.condition for one in fit.tests if one.name == name), "")
-    return f"'{name}'" if not condition or condition in name else f"'{name}' ({condition})"
-
-
-def _choice(ranking: Ranking | None) -> Iterator[str]:
-    """What else the tests allow."""
-    if ranking is None or len(ranking.laws) < 2 or ranking.adequacy is None:
-        return
-    others = [one.fit.law.name for one in ranking.credible[1:]]
-    if others:
-        yield CAUTIONS["undecided"].format(laws=named(others, "law"))
-    same = f"{ranking.best.law.name} above "  # a threshold
-    yield from (challenge_text(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
-    if not (others or ranking.challenges or ranking.adequacy.rejects):
-        yield from (unmet_text(ranking, name) for name in ("weight", "challenges") if name in ranking.unmet)
-
-
-def _precision(fit: Identification) -> Iterator[str]:
-    """What the tests do not determine, and what intervals leave out."""
-    by = "by this law the tests" if rejected(fit) else "the tests"
-    for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
-        names = [e.name for e in fit.estimates if e.verdict == verdict]
-        if names:
-            yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
-    exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
-    far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
-    if far is not None and not rejected(fit) and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
-        yield CAUTIONS["one test"].format(test=_test(fit, far.test), exponent=f"{far.exponent:.3g}")
-    change = combined_change_text(fit.unmodelled)
-    if change:
-        kinds = " and ".join(dict.fromkeys(one.description for one in beyond_intervals(fit.unmodelled)[:2]))
-        yield CAUTIONS["not included"].format(kinds=kinds, change=change)
-
-
-def _data(quality: DataQuality | None) -> Iterator[str]:
-    if quality is not None and quality.flags:
-        tests = list(dict.fromkeys(name for flag in quality.flags for name in flag.tests))
-        yield CAUTIONS["suspect"].format(tests=named(tests, "test"))
-
-
 # ---- the answer ------------------------------------------------------------------------------------------------------
 
 
@@ -402,30 +263,31 @@ def answer(
     asked: Sequence[KeyFigure] = (),
     quality: DataQuality | None = None,
     searched: Sequence[str] = (),
+    design: Design | None = None,
     **page: Any,
 ) -> Answer:
     """Headline, equations, values, key figures, cautions and what to do next, of the best law of a ranking if given.
 
-    asked : what forecasts say. quality : of the data. searched : names of laws that a search of laws tried. page :
-    picture and files.
+    asked : what forecasts say. quality : of the data. searched : names of laws that a search of laws tried. design : of
+    further tests, whose first is what to do next. page : picture and files.
     """
     symbols = symbols_of(fit.law)
     remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
     remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), same_functions(ranking)]
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
-    exponent = next((one.value for one in figures if one.name.endswith("stress exponent")), math.nan)
-    other = "; n is not the stress exponent" * (abs(n - exponent) > OTHER_EXPONENT * exponent)
+    exponent = next((one.value for one in figures if one.name == "stress exponent"), math.nan)
+    other = OTHER_N * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     figures = [*asked[:MOST_ASKED], *figures]
     return Answer(
         fit.headline,
-        tests_text(fit),
+        "; ".join(filter(None, (tests_text(fit), mean_misfit_text(fit)))),
         titled_law(fit.law),
         equations(fit.law),
         [(symbols[e.name], *_shown_value(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
         [(one.name, one.where, one.text, one.remark) for one in figures],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
-        next_step(fit, ranking, searched),
+        next_step(fit, ranking, searched) if design is None or not design.plan else planned_text(design),
         remarks,
         brackets=BRACKETS * any("[" in one.text for one in figures),
         role=headline_role(fit),
@@ -434,11 +296,23 @@ def answer(
     )
 
 
-def answer_text(
-    fit: Identification, ranking: Ranking | None = None, more: object = ".details()", searched: Sequence[str] = ()
-) -> str:
-    """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest."""
-    return as_text([answer(fit, ranking, more=str(more), searched=searched)])
+def planned_text(design: Design) -> str:
+    """The tests of a design as what to do next."""
+    return design.sentence.removeprefix(DESIGN["test"].partition("{")[0])
+
+
+def codes_text(fit: Identification) -> str:
+    """The law's keyword, or the routine that it needs, in finite element codes; "" where none takes it."""
+    found = [f"{program}: {line}" for program, line in input_of_programs(fit).items()]
+    return f"{CODES.format(codes='; '.join(found))} ({MORE_CODES})" if found else ""
+
+
+def answer_text(fit: Identification, ranking: Ranking | None = None, more: object = ".details()", **known: Any) -> str:
+    """The answer of one law, or of the best of a ranking with the weights of all; more : what shows the rest.
+
+    known : laws that were searched, and a design, see answer().
+    """
+    return as_text([answer(fit, ranking, more=str(more), **known)])
 
 
 def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) -> Table:
@@ -448,13 +322,13 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
     """
     rows: list[Sequence[Cell]] = []
     for name, (fit, decisive) in groups.items():
-        figures = {one.name.removeprefix("measured "): one.text for one in key_figures(fit)}
+        figures = {one.name: one.text for one in key_figures(fit)}
         choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
         rate, stress = figures.get("creep rate", "–").replace(" %/h", ""), number(fit.tested_point.stress, 3)
         numbers = (figures.get("stress exponent", "–"), rate, stress)
         rows.append((name, titled_law(fit.law), *numbers, f"{verdict_text(fit.adequacy)}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
-    caption = "in brackets: 95 % intervals; of a law that the tests reject the measured stress exponent, and no rate"
+    caption = "in brackets: 95 % intervals; of a law that the tests reject the slope of measured rates, and no rate"
     return Table(caption, columns, rows)
 
 
@@ -493,10 +367,11 @@ def symbols_of(law: CreepLaw) -> dict[str, Rich]:
 
 def _shown_value(law: CreepLaw, estimate: Estimate) -> tuple[str, tuple[str, str]]:
     """A value and the ends of its interval, with the digits that this leaves, or that the tests do not determine it."""
-    fewest = FEWEST_DIGITS - (estimate.verdict in (NOT_DETERMINED, POORLY_DETERMINED))
-    digits = min(interval_digits(estimate.value, estimate.low, estimate.high, fewest=fewest), MOST_SHOWN)
-    said = NOT_DETERMINED if estimate.verdict == NOT_DETERMINED else f"= {number(estimate.value, digits)}"
-    return said, interval_ends(law, estimate, digits)
+    digits = FEWEST_DIGITS - 1
+    if estimate.verdict not in (NOT_DETERMINED, POORLY_DETERMINED):
+        digits = min(interval_digits(estimate.value, estimate.low, estimate.high), MOST_SHOWN)
+    said = NOT_DETERMINED if estimate.verdict == NOT_DETERMINED else f"= {_written_out(estimate.value, digits)}"
+    return said, interval_ends(law, estimate, lambda end: _written_out(end, digits))
 
 
 def value_cells(law: CreepLaw, estimate: Estimate, held: str = "") -> dict[str, str]:
@@ -551,7 +426,7 @@ def held_quantities(fit: Identification) -> str:
 
 
 def reference_sentences(fit: Identification) -> list[str]:
-    """Where the rate amid the tests is taken, and the exponent of the law's formula where that is another."""
+    """Where the rate amid the tests is taken, and the slope of the law's formula where that is another."""
     r, state, held = fit.tested_point, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
@@ -560,8 +435,8 @@ def reference_sentences(fit: Identification) -> list[str]:
         lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
     if held and (held != "strain" or state is None):
         formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
-        lines.append(f"at constant {held} the law's formula has the stress exponent {formula}")
-        lines += [] if held == "strain" else ["tests compared at one strain show another exponent"]
+        lines.append(f"at constant {held} the slope of the law's formula over stress is {formula}")
+        lines += [] if held == "strain" else ["tests compared at one strain show another slope"]
     return lines
 
 

@@ -154,7 +154,8 @@ class Answer:
     is not determined, ends of its interval, unit) of the parameters. role : how serious the headline is, "" of a law
     that the tests do not reject, "caution", "warning".
     picture : a Picture, or the Paragraph that says why there is none.
-    more : what shows the rest. units : of the values. brackets : what the intervals of figures hold.
+    more : what shows the rest. units : of the values. brackets : what the intervals of figures hold. codes : how finite
+    element codes take the law.
     figures : (name, where it holds, value with interval, remark).
     """
 
@@ -173,6 +174,7 @@ class Answer:
     more: str = ".details()"
     units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
     brackets: str = ""
+    codes: str = ""
     role: str = ""
 
     def __str__(self) -> str:

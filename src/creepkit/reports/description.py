@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends, plural, plural_of
 from creepkit.reports.verdicts import cause_headline
-from creepkit.reports.words import FITS, HEADLINES, MISSES, TRUTHS
+from creepkit.reports.words import FITS, HEADLINES, MEAN_MISFIT, MISSES, ONE_TEST, TRUTHS
 
 if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
@@ -83,16 +85,70 @@ def spread_text(spread: float) -> str:
     return f"{float(f'{100 * np.expm1(spread):.2g}'):g} %"
 
 
+@dataclass(frozen=True)
+class NewTestInterval:
+    """How far one new test may lie from the law, amid the conditions of those that were made.
+
+    quantity : "life" where lives were measured, else "rate". level : "heat" or "laboratory" of which it is another one,
+    where the tests tell these apart; else "test". half_width : of the 95 % interval of ln of predicted over measured,
+    as root mean square over the conditions of the tests: of law, scatter between tests, and what a rejected law misses.
+    """
+
+    quantity: str
+    level: str
+    half_width: float
+
+    @classmethod
+    def of(cls, fit: Identification) -> NewTestInterval | None:
+        """That of an identification; None of so few tests that they do not show how they scatter."""
+        scatter = fit.rate_scatter
+        if scatter is None or len(scatter.tests) < MINIMUM_TESTS or scatter.stresses.size != len(scatter.tests):
+            return None
+        lives = [m.rupture for m in fit.tests if m.rupture is not None and m.rupture.used and not m.rupture.censored]
+        measured = lives or [m.minimum_rate for m in fit.tests if m.minimum_rate is not None and not m.outputs]
+        ends = [(one.low, one.high) for one in measured if one is not None]  # of a single test of its own heat
+        level = next((one for one in ("heat", "laboratory") if one in scatter.levels), "test")
+        drawn = scatter.levels if not ends else [level] * (level != "test")
+        low, high = np.array(ends).T if ends else fit.rate(scatter.stresses, scatter.temperatures, warn=False)[1:]
+        variance = (np.log(high / low) / (2.0 * NORMAL_QUANTILE)) ** 2 + sum(map(scatter.posterior.mean_square, drawn))
+        known = variance[np.isfinite(variance)]
+        if not known.size:
+            return None
+        return cls("life" if lives else "rate", level, float(NORMAL_QUANTILE * np.sqrt(known.mean())))
+
+    @property
+    def text(self) -> str:
+        """Such as "a new test's rate within a factor of 1.18 (95 %)"."""
+        factor = float(np.exp(min(self.half_width, 50.0)))
+        shown = f"{factor:.3g}" if factor < 2.0 else f"{factor:.2g}"
+        return ONE_TEST.format(level=self.level, quantity=self.quantity, factor=shown)
+
+
 def headline(fit: Identification) -> str:
-    """What the law is to be used for and where, with its mean misfit, then whether it could be the true one."""
+    """Where the law is to be used, how far a new test may lie from it, then whether it could be the true one."""
     items = Description.of(fit).items()
-    good, bad, described = (
-        " and ".join(words.format(what=name, misfit=spread_text(value)) for name, value in some)
-        for words, some in ((FITS, _usable(items)), (MISSES, _usable(items, False)), (MISSES, items))
-    )
-    described = f"; so far it misses {described}" if items else ""
-    values = {"law": fit.law.name, "good": good, "bad": bad, "truth": _truth(fit), "described": described}
+    bad = _said(MISSES, _usable(items, False))
+    new = NewTestInterval.of(fit)
+    values = {
+        "law": fit.law.name,
+        "range": tested_range(fit),
+        "within": f"on average it fits {_said(FITS, items)}" if new is None else new.text,
+        "bad": bad,
+        "truth": _truth(fit),
+        "described": f"; so far it misses {_said(MISSES, items)}" if items else "",
+    }
     return HEADLINES[headline_kind(fit)].format(**values)
+
+
+def mean_misfit_text(fit: Identification) -> str:
+    """The mean misfit of the tests that were fitted, where the headline says instead how far a new one may lie."""
+    usable = headline_kind(fit) in ("use", "use only", "use in part") and NewTestInterval.of(fit) is not None
+    items = ", ".join(f"{name} {spread_text(value)}" for name, value in Description.of(fit).items())
+    return MEAN_MISFIT.format(misfits=items) if usable else ""
+
+
+def _said(words: str, items: list[tuple[str, float]]) -> str:
+    return " and ".join(words.format(what=name, misfit=spread_text(value)) for name, value in items)
 
 
 def headline_kind(fit: Identification) -> str:
@@ -103,7 +159,7 @@ def headline_kind(fit: Identification) -> str:
         return "not found"
     if not good:
         return "use nothing" if bad else "fitted"
-    return f"{'between' if rejected(fit) and not in_tests else 'use'}{' in part' * bool(bad)}"
+    return "use in part" if bad else "use only" if rejected(fit) and not in_tests else "use"
 
 
 def headline_role(fit: Identification) -> str:
@@ -124,15 +180,16 @@ def rejected(fit: Identification | TemperatureLaw) -> bool:
 
 
 def tested_range(fit: Identification) -> str:
-    """Stresses and temperatures of the tests."""
-    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius_text(*fit.ranges['temperature'], digits=0)}"
+    """Stresses and temperatures of the tests, "80–200 MPa, 575–625 °C"."""
+    celsius = celsius_text(*fit.ranges["temperature"], digits=0)
+    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius}".replace(" to ", "–")
 
 
 def tests_text(fit: Identification) -> str:
-    """How many tests, under which conditions and until when."""
+    """How many tests until when."""
     longest = fit.ranges["time"][1]
-    until = f", to {time_text(longest)}" if longest > 0.0 else ""
-    return f"{plural(len(fit.tests), 'test')}, {tested_range(fit)}{until}"
+    until = f" to {time_text(longest)}" if longest > 0.0 else ""
+    return f"{plural(len(fit.tests), 'test')}{until}"
 
 
 def _truth(fit: Identification) -> str:

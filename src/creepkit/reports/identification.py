@@ -21,7 +21,6 @@ from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text
 from creepkit.reports.answer import (
     MOST_CAUTIONS,
-    cautions,
     chosen_text,
     constant_load_sentence,
     equations,
@@ -31,6 +30,7 @@ from creepkit.reports.answer import (
     value_cells,
 )
 from creepkit.reports.blocks import Block, Cell, Formula, Items, Paragraph, Table, as_text, first_of, number, plural
+from creepkit.reports.cautions import cautions
 from creepkit.reports.compared_values import (
     LAW_RATE_MEANING,
     OWN_RATE_CHI_SQUARE,

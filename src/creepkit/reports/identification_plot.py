@@ -58,7 +58,7 @@ LABEL_SIZE, LABEL_PLACES = np.array([19.0, 9.0]), np.array([(2.0, -3.0), (-9.0, 
 
 
 LABEL_CLEAR, LABEL_STEP = 4.0, 8
-"""Points that it is clear of other curves, beyond which further away is no better; and between places tried."""
+"""Points that it is clear of others and of curves, beyond which further is no better; and between places tried."""
 
 
 MOST_LABELLED = 16
@@ -172,7 +172,7 @@ def _label_curves(axes: Axes, labels: Sequence[str], colours: Sequence[Any]) -> 
             for corner in anchor + LABEL_PLACES:
                 beside = np.maximum(np.maximum(corner - drawn, drawn - corner - LABEL_SIZE), 0.0)
                 clear = min(float(np.hypot(*beside.T).min(initial=LABEL_CLEAR)), LABEL_CLEAR)
-                free = all((abs(corner - one) > LABEL_SIZE).any() for one in taken)
+                free = all((abs(corner - one) > LABEL_SIZE + LABEL_CLEAR).any() for one in taken)
                 if free and clear > clearest and corner[0] > left and corner[1] + LABEL_SIZE[1] < top:
                     best, clearest = corner, clear
         if best is not None:

@@ -48,9 +48,13 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
             return _test_text("separate", fit, ranking.credible[1].fit)
         if ranking.challenges:
             first = ranking.challenges[0]
-            kinds = {"unmodelled effect": "measure", "threshold": "threshold", "sum": "separate otherwise"}
+            if first.kind == "threshold":
+                return _test_text("threshold", fit)
+            kinds = {"unmodelled effect": "measure", "sum": "separate otherwise"}
             return NEXT[kinds[first.kind]].format(first=fit.law.name, second=first.subject, effect=first.subject)
-    return _test_text("determine", fit, names=names) if weak else NEXT["use"]
+    if weak:
+        return _test_text("determine", fit, names=names)
+    return "; ".join([NEXT["use"], *([_test_text("narrow", fit)] if further_test(fit, None) else [])])
 
 
 def law_to_try(fit: Identification, tried: Sequence[str]) -> tuple[str, str] | None:
@@ -91,28 +95,35 @@ LACKING = {
 
 def _test_text(kind: str, fit: Identification, other: Identification | None = None, names: str = "") -> str:
     """The test to make, by its stress, temperature and duration; in general where none of the kind is found."""
-    found = further_test(fit, other)
+    found = further_test(fit, other, lowest=kind == "threshold")
     values: dict[str, str] = {"names": names, "first": fit.law.name, "second": other.law.name if other else ""}
     if found is not None:
         stress, T, hours, factor = found
-        values |= {"stress": f"{stress:.2g}" if stress < 100 else f"{stress:.0f}", "hours": f"{hours:.2g}"}
+        values |= {
+            "stress": f"{stress:.2g}" if stress < 100 else f"{stress:.0f}",
+            "hours": f"{float(f'{hours:.2g}'):g}",
+        }
         values |= {"celsius": celsius_text(T, digits=0), "factor": f"{factor:.2g}"}
     return NEXT[kind if found else f"{kind} otherwise"].format(**values)
 
 
-def further_test(fit: Identification, other: Identification | None) -> tuple[float, float, float, float] | None:
+def further_test(
+    fit: Identification, other: Identification | None, *, lowest: bool = False
+) -> tuple[float, float, float, float] | None:
     """The bar under a constant load that tells most: stress, MPa, temperature, K, duration, h, and a factor.
 
     It is the one whose rate the law knows least (a test there lowers the determinant of the covariance most), or where
     the rates of two laws differ most over what is known of both; the factor is the half width of its 95 % interval, or
     that between the laws. It takes no longer than LONGER times the longest test until the strain of the reference
-    point. None of tests other than bars, and where the laws differ by less than SEPARATE standard deviations.
+    point. None of tests other than bars, and where the laws differ by less than SEPARATE standard deviations. lowest :
+    it is that of the lowest stress, and of these the shortest.
     """
     if not are_bars(fit):
         return None
     low, high = fit.ranges["stress"]
-    kelvin = sorted({round(T, 1) for one in fit.histories for T in held_temperatures(one)})
-    stress, T = (one.ravel() for one in np.meshgrid(np.geomspace(BEYOND[0] * low, BEYOND[1] * high, 16), kelvin))
+    kelvin = sorted({-round(T, 1) for one in fit.histories for T in held_temperatures(one)})
+    stresses = np.geomspace(BEYOND[0] * low, BEYOND[1] * high, 16)
+    stress, T = (one.ravel() for one in np.meshgrid(stresses, np.negative(kelvin)))  # of one stress the shortest first
     rate, *ends = fit.rate(stress, T, warn=False)
     hours = fit.reference.strain / rate / SECONDS_PER_HOUR
     longest = max(float(one.times[-1]) for one in fit.histories) / SECONDS_PER_HOUR
@@ -124,6 +135,7 @@ def further_test(fit: Identification, other: Identification | None) -> tuple[flo
         apart = np.abs(np.log(rate / theirs))
         scatter = fit.noise_model.rate**2 + (np.log(theirs_ends[1] / theirs_ends[0]) / (2 * NORMAL_QUANTILE)) ** 2
         value, factor = apart / np.sqrt(spread**2 + scatter + LEAST_SCATTER**2), np.exp(apart)
+    value = 1.0 / stress if lowest else value
     value = np.where(possible & np.isfinite(value), value, -1.0)
     k = int(np.argmax(value))
     if value[k] < (0.0 if other is None else SEPARATE):

@@ -18,6 +18,7 @@ from creepkit.records.held_levels import held_temperatures
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.description import rejected
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
+from creepkit.reports.words import MEAN_SLOPES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -254,7 +255,7 @@ def exponent_sentence(rates: Sequence[MinimumRate]) -> str:
     measured, _, predicted = exponents(rates)
     if not np.isfinite([measured, predicted]).all():
         return ""
-    return f"stress exponent: measured {measured:.2g}, law {predicted:.2g}"
+    return MEAN_SLOPES.format(measured=f"{measured:.2g}", predicted=f"{predicted:.2g}")
 
 
 # ---- the map of a plate ----------------------------------------------------------------------------------------------

@@ -113,6 +113,11 @@ def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
     return change_text(float(np.linalg.norm(changes))) if changes else ""
 
 
+def test_change_text(one: Perturbation) -> str:
+    """By how much a drift changes the rate of a test at its end; "" of all else."""
+    return change_text(abs(one.per_kelvin) * one.size) if np.isfinite(one.per_kelvin) else ""
+
+
 def perturbation_text(one: Perturbation) -> str:
     """By how much the rate amid the tests would move with what, to follow "would move"."""
     alone, energy = one.tests == 1, ""

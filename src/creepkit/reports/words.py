@@ -8,13 +8,11 @@ from __future__ import annotations
 
 HEADLINES = {
     # everything that was measured is predicted within a factor of 2
-    "use": "use {law}: on average it fits {good}; {truth}",
-    # some of it is, some is not
-    "use in part": "use {law} in part: on average it fits {good}, but misses {bad}; {truth}",
+    "use": "use {law} for {range}: {within}; {truth}",
     # everything is, but the tests reject the law
-    "between": "use {law} between the tests only: on average it fits {good}; {truth}",
-    # some is, and they reject it
-    "between in part": "use {law} between the tests only: on average it fits {good}, but misses {bad}; {truth}",
+    "use only": "use {law} for {range} only: {within}; {truth}",
+    # some of it is, some is not
+    "use in part": "use {law} in part, for {range}: {within}, but it misses {bad}",
     # nothing is
     "use nothing": "do not use {law}: on average it misses {bad}; {truth}",
     # nothing can be compared, as of fields alone
@@ -22,7 +20,15 @@ HEADLINES = {
     # the search did not converge
     "not found": "do not use {law} yet: the search for its values did not converge{described}",
 }
-"""{kind: the first line of an answer}."""
+"""{kind: the first line of an answer}; range : of the tests."""
+
+
+ONE_TEST = "a new {level}'s {quantity} within a factor of {factor} (95 %)"
+"""Behind the range of a law, of three tests or more; of fewer their mean misfit stands there."""
+
+
+MEAN_MISFIT = "mean misfits: {misfits}"
+"""Of the tests that were fitted, behind how many they are."""
 
 
 FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
@@ -31,13 +37,13 @@ FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
 
 TRUTHS = {
     # no noise is stated, and too few readings show it
-    "not judged": "whether it is the exact law cannot be judged",
+    "not judged": "whether it is exact cannot be judged",
     # the p-value is 0.3 % or more
     "explains": "the tests do not reject it",
     # what it misses lies in single tests, or in two groups of them (their sentence follows)
     "in tests": "{cause}",
     # any other misfit beyond the noise; why stands in the first caution
-    "rejected": "the tests reject it as the exact law",
+    "rejected": "the tests reject it as exact",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
@@ -66,13 +72,17 @@ CAUTIONS = {
     # one so wide lies between its bounds
     "hardly determined": "{by} hardly determine {names}",
     # leaving it out moves the exponent by more than 15 %
-    "one test": "without test {test} the stress exponent is {exponent}",
+    "one test": "without test {test} the stress exponent is {change} {side}",
     # offsets or drifts would move rates
-    "not included": "intervals leave out {kinds}, another in each test: the law, their mean, would move by {change}",
+    "not included": "intervals leave out {kinds}: the law's rate moves by {change}{alone}",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
 """{kind: a caution}, the most serious first."""
+
+
+IN_EACH_TEST, ONE_ALONE = ", another in each test", ", that of one test by {change}"
+"""Of several tests; and what it does to one by itself, where that is known."""
 
 
 REASONS = {
@@ -107,8 +117,10 @@ NEXT = {
     "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
     # bars cannot
     "separate otherwise": "make a test that tells {first} from {second} (creepkit design)",
-    # the law above a threshold stress explains the tests as well
-    "threshold": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
+    # the law above a threshold stress explains the tests as well, and bars can tell
+    "threshold": "test at {stress} MPa, {celsius}, for {hours} h, which tells whether there is a threshold",
+    # bars cannot
+    "threshold otherwise": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
     "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
     # what nobody modelled, of usual size, takes the rejection away; or the true stress held in place of the load
@@ -119,19 +131,34 @@ NEXT = {
     "determine otherwise": "make a test that determines {names} (creepkit design)",
     # none of these
     "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
+    # behind that, of bars
+    "narrow": "to narrow intervals, test at {stress} MPa, {celsius}, for {hours} h: a factor of {factor} there",
 }
 """{kind: what to do now}."""
 
 
-BRACKETS = (
-    "In brackets: 95 % intervals, of what one new test may show where this is said. "
-    "The misfit of the headline is the mean of the fitted tests, not that of a forecast."
-)
+BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
 """Below the numbers of an answer."""
 
 
 NEW_TEST = "{condition}, one new test"
 """Where a number holds whose interval has the scatter between tests in it."""
+
+
+OVER_ALL_TESTS, MEAN_SLOPE = "over all tests", "slope of the measured rates: {value}"
+"""Where a stress exponent or activation energy is that of the measured rates; and beside the law's at one condition."""
+
+
+MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
+"""Above the picture of minimum rates."""
+
+
+OTHER_N = "; n is a parameter, not the stress exponent"
+"""Beside the values of a law in which they differ."""
+
+
+CODES, MORE_CODES = "In {codes}", "creepkit export writes them, and those of other codes"
+"""Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 
 ALL_DIGITS = "all digits{more}: details"

@@ -67,7 +67,7 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     base = os.path.relpath(folder, path.absolute().parent).replace("\\", "/")
     names, tests, problems, failure = _readable(folder, path, reader)
     cameras = found_cameras(folder, path, [folder / name for name in names], base)
-    known: dict[str, Any] = {"title": folder.absolute().name, "cameras": cameras, "summary": None}
+    known: dict[str, Any] = {"title": title_of(tests, folder.absolute()), "cameras": cameras, "summary": None}
     known["report"] = "report.html" if path.stem == "study" else f"{path.stem}.html"
     lines = cameras.summary
     if tests:
@@ -97,6 +97,30 @@ def propose_study(folder: Path, path: Path, reader: str | None = None) -> StudyP
     text = rendered(known)
     parse_study(path, text)  # what is written must be valid
     return StudyProposal(text, lines, cameras.empty_alloys)
+
+
+CAMPAIGN_LABELS = "heat", "cast", "batch", "campaign", "project"
+"""Of tests, beside their alloy: what a study may be called after."""
+
+
+PLAIN_FOLDERS = {"data", "daten", "raw", "tests", "measurements", "messdaten", "messungen", "curves", "csv", "input"}
+"""Names that say nothing of what was tested; the folder around says more."""
+
+
+MOST_TITLED = 3
+"""Alloys that a title names."""
+
+
+def title_of(tests: Sequence[History], folder: Path) -> str:
+    """What a study is called: the alloys of its tests, a label that all of them share, or a folder that says more."""
+    alloys = dict.fromkeys(one.alloy for one in tests)
+    if tests and all(alloys) and len(alloys) <= MOST_TITLED:
+        return ", ".join(alloys)
+    for key in CAMPAIGN_LABELS:
+        values = {one.labels.get(key, "") for one in tests}
+        if len(values) == 1 and (value := values.pop()):
+            return f"{key} {value}"
+    return next((one.name for one in (folder, folder.parent) if one.name.casefold() not in PLAIN_FOLDERS), "")
 
 
 def one_line(text: str, length: int = 200) -> str:

@@ -111,7 +111,7 @@ def test_a_planted_law_is_found_and_stands_on_the_front() -> None:
     stress, strain = np.meshgrid([60.0, 80.0, 110.0, 150.0], np.geomspace(1e-3, 0.03, 9))
     found = ck.lower(search.best.law).rate(search.best.values, stress=stress, strain=strain, temperature=900.0)
     assert found == pytest.approx(1e-8 * (stress / 80.0) ** 5 * (1 + 4 * np.exp(-strain / 0.006)), rel=0.05)
-    assert str(search).startswith(f"use {search.best.law.name}: on average it fits")
+    assert str(search).startswith(f"use {search.best.law.name} for ")
     front = search.front
     assert all(a.complexity < b.complexity and a.misfit > b.misfit for a, b in pairwise(front))
     assert search.to_dataframe()["front"].sum() == len(front)

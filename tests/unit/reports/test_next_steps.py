@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.reports.answer import table_of_groups
+from creepkit.reports.answer import codes_text, table_of_groups
+from creepkit.reports.description import NewTestInterval
 from creepkit.reports.next_steps import LACKING, further_test, law_to_try, next_step
 from creepkit.reports.words import NEXT
 
@@ -34,7 +35,7 @@ def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
     early = ck.identify("norton", bars(lambda x: x + 0.5 * (1 - np.exp(-10 * x))))
     assert law_to_try(early, []) == ("norton*primary", "early")
     assert law_to_try(early, ["norton*primary"]) == ("strain-hardening", "early")
-    assert "norton between the tests only: on average it fits " in early.headline
+    assert "use norton for 80–200 MPa, 627 °C only: a new test's rate within a factor of " in early.headline
     assert next_step(early, searched=[one.format(law="norton") for one in LACKING["early"]]) == NEXT["within"]
     late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
     assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")
@@ -53,6 +54,27 @@ def test_two_power_laws_that_cross_amid_the_tests_are_told_apart_at_their_end_an
     assert stress == pytest.approx(64.0)
     assert factor == pytest.approx((AMID / 64.0) ** 2, rel=0.05)
     assert further_test(steady, steady) is None
+
+
+def test_a_new_test_lies_as_far_from_the_law_as_a_regression_predicts(steady):
+    """ln rate over ln stress by four tests whose rates scatter by 0.2: 0.04 (1 + leverage), 1/2 in the mean."""
+    fit = ck.identify("norton", bars(), nuisances=[ck.Nuisance("rate", sd=0.2)], usual_errors="none")
+    new = NewTestInterval.of(fit)
+    assert (new.quantity, new.level) == ("rate", "test")
+    assert new.half_width == pytest.approx(1.96 * 0.2 * np.sqrt(1.5), rel=0.02)
+    assert f"a new test's rate within a factor of {np.exp(new.half_width):.3g} (95 %)" in fit.headline
+    assert NewTestInterval.of(ck.identify("norton", bars()[:2])) is None  # which do not show how rates scatter
+
+
+def test_what_is_to_be_done_names_one_test_with_its_stress_temperature_and_time(steady):
+    stress, _, hours, _ = further_test(steady, None, lowest=True)
+    assert stress == pytest.approx(0.8 * 80.0)
+    assert f"test at 64 MPa, 627 °C, for {float(f'{hours:.2g}'):g} h" in next_step(steady)
+
+
+def test_finite_element_codes_have_a_power_law_built_in_and_need_a_routine_for_damage(steady):
+    assert codes_text(steady).startswith("In Abaqus: *CREEP, LAW=STRAIN; CalculiX: *CREEP, LAW=")
+    assert "Ansys: TB,CREEP,1,1,3,10" in codes_text(steady)
 
 
 def test_the_row_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_intervals(steady):

@@ -40,6 +40,19 @@ def test_a_stage_that_fails_leaves_the_others(study: Path, plain_pages: None) ->
     assert states(again)["temperature of A"] == "failed"
 
 
+def test_the_page_of_a_study_with_a_design_says_which_test_to_make_next(study: Path) -> None:
+    rig = '[design]\ngoal = "exponent"\nat_stress_MPa = 60\nlevels = { stress_MPa = [40, 90] }\nlongest_h = 20\n'
+    study.write_text(f"{ONE_FIT}{rig}[report]\n")
+    result = ck.Study.load(study).run()
+    (planned,) = result.designs[""].plan[:1]
+    assert result.report is not None
+    page = result.report.read_text()
+    first, behind = page.split('id="values"')[0], page.split('id="design"')[1]
+    shown = planned.description.replace(" MPa", "\u00a0MPa").replace(" h", "\u00a0h").replace(" °C", "\u00a0°C")
+    assert shown in first.split("<b>Next:</b>")[1]
+    assert shown in behind
+
+
 def test_a_report_runs_again_from_what_it_carries(study: Path, plain_pages: None, tmp_path: Path) -> None:
     study.write_text(STUDY.replace("data/*.csv", "../elsewhere/*.csv") + "[report]\n")
     (study.parent / "data").rename(study.parent.parent / "elsewhere")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import creepkit as ck
 from creepkit.errors import StudyError
-from creepkit.studies.proposal import propose_study
+from creepkit.studies.proposal import propose_study, title_of
 from creepkit.studies.stages import export_name
 from creepkit.studies.study_file import key_lines, known_keys, parse_study
 from helpers.paths import ROOT
@@ -330,3 +330,15 @@ def test_a_proposed_study_asks_for_forms_of_temperature_only_of_tests_at_three_h
             rows = "".join(f"{k},{one},{0.01 * (k + k**0.5):.4f}\n" for k, one in enumerate(celsius))
             (tmp_path / f"{name}.csv").write_text(f"# stress_MPa: 60\ntime_h,temperature_C,strain_pct\n{rows}")
         assert ("\n[temperature]\n" in propose_study(tmp_path, tmp_path / "study.toml").text) == expected
+
+
+def test_a_proposed_study_is_called_after_what_was_tested_and_never_data(tmp_path):
+    def bars(**stated):
+        return [ck.History("a", [1.0], {"strain": [0.01]}, ck.constant_stress(50.0), 900.0, **stated)]
+
+    folder = tmp_path / "9Cr" / "data"
+    assert title_of(bars(alloy="CMSX-6"), folder) == "CMSX-6"
+    assert title_of([*bars(alloy="A"), *bars(alloy="B")], folder) == "A, B"
+    assert title_of(bars(labels={"heat": "B07"}), folder) == "heat B07"
+    assert title_of([*bars(labels={"heat": "B07"}), *bars(labels={"heat": "C1"})], folder) == "9Cr"
+    assert title_of(bars(), folder.parent) == title_of([], folder) == "9Cr"

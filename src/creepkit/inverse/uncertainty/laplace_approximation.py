@@ -175,10 +175,12 @@ def bound_marks(law: CreepLaw, estimate: Estimate) -> tuple[str, str]:
     return low, high
 
 
-def interval_ends(law: CreepLaw, estimate: Estimate, digits: int = 4) -> tuple[str, str]:
+def interval_ends(
+    law: CreepLaw, estimate: Estimate, written: Callable[[float], str] = "{:.4g}".format
+) -> tuple[str, str]:
     """The ends of a 95 % interval in plain text, with those marked that are bounds of the search."""
     marks = bound_marks(law, estimate)
-    return f"{estimate.low:.{digits}g}{marks[0]}", f"{estimate.high:.{digits}g}{marks[1]}"
+    return f"{written(estimate.low)}{marks[0]}", f"{written(estimate.high)}{marks[1]}"
 
 
 def verdict_of_interval(param: Param, value: float, interval: tuple[float, float]) -> str:

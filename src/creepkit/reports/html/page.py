@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.inverse.uncertainty.correlation import LOOSE
-from creepkit.reports.answer import KeyFigure, answer, asked_figures, rupture_figures, table_of_groups
+from creepkit.reports.answer import KeyFigure, answer, asked_figures, codes_text, rupture_figures, table_of_groups
 from creepkit.reports.attachments import embed
 from creepkit.reports.blocks import (
     Answer,
@@ -32,7 +32,7 @@ from creepkit.reports.blocks import (
     typeset,
 )
 from creepkit.reports.composition import composition_blocks, map_sentence
-from creepkit.reports.description import rejected, tests_text
+from creepkit.reports.description import rejected, tested_range, tests_text
 from creepkit.reports.design import design_blocks
 from creepkit.reports.extraction import extraction_figure, extraction_text
 from creepkit.reports.forecast import forecast_answer, forecast_blocks
@@ -91,11 +91,9 @@ def report_html(contents: ReportContents) -> str:
 
 
 def _summary(contents: ReportContents) -> str:
-    """How many tests, of one material under which conditions, and when they were identified."""
+    """How many tests, unless the answer says that, and when they were identified."""
     tests = sum(len(one.histories) or len(one.fit.tests if one.fits else ()) for one in contents.groups)
-    parts = [plural(tests, "test")] if tests else []
-    if len(contents.groups) == 1:
-        parts = [typeset(tests_text(one.fit)) for one in contents.identified] or parts
+    parts = [plural(tests, "test")] if tests and (len(contents.groups) > 1 or not contents.identified) else []
     if len(contents.groups) > 1:
         parts.append(plural(len(contents.groups), "material"))
     dates = sorted({str(one.fit.provenance.get("when", ""))[:10] for one in contents.identified} - {""})
@@ -141,13 +139,14 @@ def block_shown(block: Block, names: LawNames) -> Block:
         return dataclasses.replace(
             block,
             headline=said(block.headline),
-            tests=typeset(block.tests),
+            tests=said(block.tests) if block.tests else "",
             picture=None if block.picture is None else block_shown(block.picture, names),
             values=[cells((name, _value_shown(value, ends), unit)) for name, value, ends, unit in block.values],
             figures=[cells(one) for one in block.figures],
             cautions=[said(one) for one in block.cautions],
             next_step=said(block.next_step),
             brackets=said(block.brackets) if block.brackets else "",
+            codes=said(block.codes) if block.codes else "",
         )
     return block
 
@@ -177,8 +176,9 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         asked = [figure for forecast in contents.forecasts.values() for figure in asked_figures(forecast)]
         asked += [figure for one in contents.rupture.values() for figure in rupture_figures(one)]
         files = files_to_download(contents)[:MOST_FILES]
-        first = group_answer(found[0], figures, asked=asked, quality=contents.quality, files=files)
-        blocks.append(dataclasses.replace(first, tests=first.tests * (len(contents.groups) > 1)))  # said in the title
+        page: dict[str, Any] = {"quality": contents.quality, "design": next(iter(contents.design.values()), None)}
+        page |= {"files": files, "codes": codes_text(found[0].fit)}
+        blocks.append(group_answer(found[0], figures, asked=asked, **page))
     elif not found:
         failed = any(group.failure or group.result is not None for group in contents.groups)
         if contents.groups and (failed or not contents.rupture):
@@ -275,11 +275,11 @@ def _sections_of(
         else ""
     )
     tests = blocks_of_tests(fit, figures, of=found.of, most=most)
-    yield PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}{far}")
+    yield PageSection(f"{prefix}tests", "Tests", tests, result=f"{tests_text(fit)}, {tested_range(fit)}{far}")
     if ranking is not None:
         none = ", none of which explains the tests" if rejected(fit) else f": weight {ranking.laws[0].weight:.2f}"
         blocks = ranking_blocks(ranking, figures if drawn else None, found.of)
-        said = f"best of {plural(len(ranking.laws), 'law')}{none}"
+        said = f"best of {plural(sum(not one.same_as for one in ranking.laws), 'law')}{none}"
         yield PageSection(f"{prefix}ranking", "Laws compared", blocks, result=said)
     scatter = f"rates of tests scatter by {scatter_text(fit.noise_model.rate)}"
     said = scatter if len(fit.tests) > 1 else "of the readings of one test"
