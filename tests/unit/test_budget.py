@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 6525,
     "records": 2467,
     "registry": 615,
-    "reports": 6564,
+    "reports": 6568,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_439
+TESTS = 30_442
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
