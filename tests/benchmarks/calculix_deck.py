@@ -45,6 +45,13 @@ class UserLaw:
     temperature: float = 1000.0
 
 
+@dataclass(frozen=True)
+class UserMaterial(UserLaw):
+    """A UMAT of Abaqus' interface, elasticity and creep, with so many states; strains are logarithmic."""
+
+    states: int = 2
+
+
 @dataclass(frozen=True, eq=False)
 class Deck:
     """A simulation: a mesh of CAX8R, elastic and perhaps creeping, under a pressure that follows the surface.
@@ -58,7 +65,7 @@ class Deck:
     mesh: Mesh
     E: float
     nu: float
-    creep: Norton | UserLaw | None
+    creep: Norton | UserLaw | UserMaterial | None
     pressure: Program
     times: Floats
     nodes: Ints
@@ -100,14 +107,19 @@ class Deck:
         yield from (f"{name}, {k}, {k}" for k, name in ((1, "RADIAL"), (2, "AXIAL")) if sets[name].size)
 
     def _material(self) -> Iterator[str]:
-        unit = self.stress_unit
-        yield from ("*MATERIAL, NAME=ALLOY", "*ELASTIC", f"{self.E / unit:.9g}, {self.nu:.9g}")
+        unit, name = self.stress_unit, "ALLOY"
+        if isinstance(self.creep, UserMaterial):
+            name = "ABAQUSNLALLOY" if self.large else "ABAQUSALLOY"
+            yield from (f"*MATERIAL, NAME={name}", "*USER MATERIAL, CONSTANTS=1", "0.")
+            yield from ("*DEPVAR", f"{self.creep.states}")
+        else:
+            yield from (f"*MATERIAL, NAME={name}", "*ELASTIC", f"{self.E / unit:.9g}, {self.nu:.9g}")
         if isinstance(self.creep, Norton):
             A = self.creep.A * unit**self.creep.n
             yield from ("*CREEP, LAW=NORTON", f"{A:.9g}, {self.creep.n:.9g}, {self.creep.m:.9g}")
-        elif isinstance(self.creep, UserLaw):
+        elif isinstance(self.creep, UserLaw) and not isinstance(self.creep, UserMaterial):
             yield "*CREEP, LAW=USER"
-        yield "*SOLID SECTION, ELSET=EALL, MATERIAL=ALLOY"
+        yield f"*SOLID SECTION, ELSET=EALL, MATERIAL={name}"
         if isinstance(self.creep, UserLaw):
             yield from ("*INITIAL CONDITIONS, TYPE=TEMPERATURE", f"NALL, {self.creep.temperature:.9g}")
 
@@ -125,7 +137,8 @@ class Deck:
         """Procedure and length, s, of each step: a load jumps in a static step of its own."""
         times, reached = self.pressure.times, 0.0
         jumps = times[1:][np.diff(times) <= 0.0]
-        creeping = "*STATIC" if self.creep is None else f"*VISCO, CETOL={self.cetol:.9g}"
+        static = self.creep is None or isinstance(self.creep, UserMaterial)
+        creeping = "*STATIC" if static else f"*VISCO, CETOL={self.cetol:.9g}"
         for start in [0.0, *jumps] if self.pressure.values[0] != 0.0 else jumps:
             if start > reached:
                 yield creeping, float(start) - reached

@@ -23,12 +23,12 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1388,
     "experiments": 1270,
-    "exporters": 2763,
+    "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
-    "instruments": 1158,
+    "instruments": 1159,
     "integration": 779,
     "inverse": 9514,
     "jobs": 245,
@@ -38,8 +38,8 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 6525,
-    "records": 2467,
+    "readers": 6983,
+    "records": 2469,
     "registry": 615,
     "reports": 6568,
     "rupture_assessment": 1825,
@@ -47,12 +47,12 @@ BUDGET = {
     "screening": 572,
     "specimens": 3203,
     "studies": 2785,
-    "surrogates": 1384,
+    "surrogates": 1391,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_442
+TESTS = 30_975
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

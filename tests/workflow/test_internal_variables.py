@@ -72,7 +72,7 @@ def test_every_target_writes_it_or_says_why_not(name):
 def _refusal(law, target, values):
     """Why a target refuses; nothing if it writes the law with its states."""
     try:
-        text = ck.export(law, target, values)
+        text = ck.export(law, target, values, elastic=ck.Elastic(150e3))
     except ck.errors.ExportError as error:
         return str(error)
     return "" if "hard" in text else "the internal variable is lost"

@@ -320,7 +320,7 @@ class AbaqusCreepSubroutine(CreepSubroutine):
     """Subroutine CREEP of Abaqus/Standard."""
 
     name = "abaqus"
-    serves = ("umat", "creep")
+    serves = ("creep",)
     title = "Abaqus/Standard user subroutine CREEP (fixed-form Fortran)"
     solver = "Abaqus"
 
@@ -354,7 +354,7 @@ class CalculixCreepSubroutine(CreepSubroutine):
     """Subroutine CREEP of CalculiX."""
 
     name = "calculix"
-    serves = ("umat", "creep", "ccx")
+    serves = ("creep", "ccx")
     title = "CalculiX creep.f (fixed-form Fortran)"
     solver = "CalculiX"
     state_template = "calculix_states.f"

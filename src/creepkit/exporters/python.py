@@ -60,7 +60,7 @@ def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
     floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
     lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]
     opening_lines = ['"""A creep law with its values, exported by creepkit."""', "", *comment_lines(lines, "#"), ""]
-    return "\n".join([*opening_lines, _with_helpers(body, dialect)]) + "\n"
+    return "\n".join([*opening_lines, with_helpers(body, dialect)]) + "\n"
 
 
 # ---- the functions -------------------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ def _with_author_parameters(expression: sympy.Expr, logs: LogSymbols) -> sympy.E
 # ---- imports and helpers -------------------------------------------------------------------------------------------
 
 
-def _with_helpers(code: str, dialect: PythonDialect) -> str:
+def with_helpers(code: str, dialect: PythonDialect) -> str:
     """Put the imports and the functions that the code calls before it."""
     helpers, required = dialect.helpers, _free_names(code)
     for name in reversed([*helpers]):
@@ -267,7 +267,7 @@ class NumpyExporter:
 
     def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""
-        return module_text(source, _array_dialect())
+        return module_text(source, array_dialect())
 
 
 def _numpy_imports(names: set[str]) -> str:
@@ -280,7 +280,7 @@ def _numpy_imports(names: set[str]) -> str:
 
 
 @cache
-def _array_dialect() -> PythonDialect:
+def array_dialect() -> PythonDialect:
     """Whole arrays; branches are evaluated everywhere, hence the guard against warnings of those not taken."""
     return PythonDialect(
         printer=KernelPrinter({"standard": "python3"}),

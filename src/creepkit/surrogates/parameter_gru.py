@@ -13,6 +13,7 @@ one. A law that lacks terms of the trained law is predicted with the coefficient
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -419,12 +420,16 @@ def _leave_one_out_distance(square: Floats, n: int) -> Floats:
     return np.asarray(np.where(denominator > 1e-9 * n, distance_squared, np.inf))
 
 
+PAPER_BATCH, PAPER_RATE = 64, 1e-3
+
+
 @checked
 @dataclass(frozen=True)
 class Training(Options, title="settings of a training"):
     """How a network is trained: with Adam, on batches of whole histories.
 
-    epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning.
+    epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning; None takes
+        1e-3 for 64 histories in a step, the paper's, and grows with the square root of their number.
     schedule : of the rate: "constant"; "cosine", down to zero at the last epoch; "plateau", a tenth of it whenever the
         validation loss has not fallen by a ten-thousandth for `patience` epochs, as the paper has it.
     early_stop : stop when the validation loss has not fallen for so many epochs; None goes to the end.
@@ -435,13 +440,20 @@ class Training(Options, title="settings of a training"):
 
     epochs: int = option(500, "Passes over the training rows.", limits.EPOCHS)
     batch: int = option(64, "Histories in a step.", limits.BATCH)
-    rate: float = option(1e-3, "Rate of Adam at the beginning.", limits.LEARNING_RATE)
+    rate: float | None = option(
+        None, "Rate of Adam at the beginning; 0.001 sqrt(batch / 64) by default.", limits.LEARNING_RATE
+    )
     schedule: Literal["plateau", "cosine", "constant"] = option("plateau", "Of the rate.")
     patience: int = option(15, "Epochs without gain after which a plateau lowers the rate.", limits.EPOCHS)
     early_stop: int | None = option(None, "Stop after so many epochs without gain.", limits.EPOCHS)
     clip: float | None = option(None, "Largest norm of the gradient.", limits.LARGEST_GRADIENT)
     validation: float = option(0.2, "Share of the rows that are set aside.", limits.numbers(0.001, 0.999))
     samples: int | None = option(None, "Rows of the others that are learnt from, the first so many.", limits.SAMPLES)
+
+    @property
+    def first_rate(self) -> float:
+        """Of Adam at the beginning."""
+        return PAPER_RATE * math.sqrt(self.batch / PAPER_BATCH) if self.rate is None else self.rate
 
 
 @dataclass(frozen=True, eq=False)

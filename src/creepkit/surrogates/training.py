@@ -75,7 +75,7 @@ class NetworkTraining:
         self.samples = {name: tensor.to(device) for name, tensor in sample_tensors(samples).items()}
         self.train, self.validation = (torch.from_numpy(part).to(device) for part in rows)
         self.training, self.seed = training, seed
-        self.adam = torch.optim.Adam(module.parameters(), lr=training.rate, fused=True)
+        self.adam = torch.optim.Adam(module.parameters(), lr=training.first_rate, fused=True)
         self.plateau = ReduceLROnPlateau(self.adam, patience=training.patience, min_lr=LEAST_LEARNING_RATE)
         self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
         self.best = self._weights()
@@ -111,7 +111,7 @@ class NetworkTraining:
         if not (math.isfinite(loss) and math.isfinite(validation)):
             raise SurrogateError(
                 f"the training diverged in epoch {self.epochs + 1}: its loss is not a finite number; lower the rate "
-                f"({self.training.rate:g}) or limit the gradient with clip=1"
+                f"({self.training.first_rate:g}) or limit the gradient with clip=1"
             )
         if validation < min(self.curves["validation"], default=math.inf):
             self.best = self._weights()
@@ -132,7 +132,7 @@ class NetworkTraining:
             for k, rows in enumerate(batches):
                 if self.training.schedule == "cosine":
                     done = (self.epochs + k / len(batches)) / self.training.epochs
-                    self.adam.param_groups[0]["lr"] = self.training.rate * 0.5 * (1.0 + math.cos(math.pi * done))
+                    self.adam.param_groups[0]["lr"] = self.training.first_rate * 0.5 * (1.0 + math.cos(math.pi * done))
                 rates.append(float(self.adam.param_groups[0]["lr"]))
                 total += self._step(rows) * len(rows)
         return float(total) / len(order), rates[0]

@@ -110,7 +110,7 @@ def test_an_unknown_name_is_an_error_of_its_kind_with_the_nearest_name() -> None
         (SolveError, registry.specimen, "uniaxal", r"there is no specimen 'uniaxal': did you mean 'uniaxial'\?"),
         (HistoryError, reader, "no-such", "there is no reader 'no-such': known: "),
         (ExportError, exporter, "no-such", "there is no exporter 'no-such': known: "),
-        (ExportError, exporter, "UMAT", "choose one of those that serve it: abaqus, calculix, mfront"),
+        (ExportError, exporter, "UMAT", "those that serve it: abaqus-umat, calculix-umat, ls-dyna-umat, mfront"),
     ):
         assert said_otherwise([(partial(ask, name), sentence)], error) == []
 
