@@ -47,12 +47,12 @@ BUDGET = {
     "screening": 572,
     "specimens": 3203,
     "studies": 2785,
-    "surrogates": 1391,
+    "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_975
+TESTS = 30_976
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
