@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 6983,
     "records": 2469,
     "registry": 615,
-    "reports": 6690,
+    "reports": 6694,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_978
+TESTS = 30_981
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

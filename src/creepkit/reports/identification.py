@@ -38,7 +38,7 @@ from creepkit.reports.compared_values import (
     judged_readings,
     misfit_of,
 )
-from creepkit.reports.description import rejected
+from creepkit.reports.description import mean_misfit_text, rejected
 from creepkit.reports.identification_plot import residual_caption, small_multiples
 from creepkit.reports.rate_panels import rupture_rows
 from creepkit.reports.remarks import perturbation_text, remarks
@@ -425,9 +425,13 @@ def identification_comments(fit: Identification, ranking: Ranking | None = None)
     chosen = f"; {chosen_text(ranking)}" if ranking is not None and len(ranking.laws) > 1 else ""
     intervals = [f"{e.name} {' to '.join(interval_ends(fit.law, e))}" for e in fit.estimates]
     held = " (if the law held, which the tests reject)" if rejected(fit) else ""
-    lines = [fit.headline, f"{origin}{chosen}", f"95 % intervals{held}: {', '.join(intervals)}"]
+    lines = [
+        fit.headline,
+        "; ".join(filter(None, (f"{origin}{chosen}", mean_misfit_text(fit)))),
+        f"95 % intervals{held}: {', '.join(intervals)}",
+    ]
     lines += [*_range_lines(fit), *cautions(fit, ranking)[:MOST_CAUTIONS]]
-    return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
+    return [line.replace("°C", "C").replace("–", " to ") for line in lines]  # sources in Fortran hold ASCII alone
 
 
 def _range_lines(fit: Identification) -> list[str]:
