@@ -28,9 +28,9 @@ BUDGET = {
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
-    "instruments": 1158,
+    "instruments": 1159,
     "integration": 779,
-    "inverse": 9514,
+    "inverse": 9402,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -38,21 +38,21 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 6525,
-    "records": 2467,
+    "readers": 6983,
+    "records": 2469,
     "registry": 615,
-    "reports": 6564,
+    "reports": 6694,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
     "studies": 2785,
-    "surrogates": 1391,
+    "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_798
+TESTS = 30_981
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

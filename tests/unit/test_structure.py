@@ -87,7 +87,7 @@ ALLOWED = {
     "creepkit.studies.cameras": "the same window",
     "creepkit.readers.derived_records": "which specimen load and extension are of, where a file states none",
     "creepkit.readers.imposed": "a ramp of strain that is then held is relaxation",
-    "creepkit.readers.vocabulary": "what laboratories call the sides of a flat bar",
+    "creepkit.readers.names": "what laboratories call the sides of a flat bar",
     "creepkit.studies.alloy_table": "heads of a table of dimples",
 }
 

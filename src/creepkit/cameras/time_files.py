@@ -10,9 +10,9 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import is_number
+from creepkit.readers.names import NAMES_OF
 from creepkit.readers.table import TableRow, named_columns
 from creepkit.readers.text_files import read_text_table
-from creepkit.readers.vocabulary import NAMES_OF
 from creepkit.records.camera_format import TIME_UNITS, TIMES_ALLOWED, ColumnName
 
 FIRST_UNIX_MILLISECONDS = 1e11

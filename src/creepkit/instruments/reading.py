@@ -27,7 +27,8 @@ from creepkit.instruments.column_heads import (
 from creepkit.instruments.reading_options import RecordOptions
 from creepkit.instruments.record_tables import MISSING, RowReader, Rows, TableHead, find_head, means
 from creepkit.limits import HOTTEST
-from creepkit.readers.vocabulary import NAMES_OF, words_of
+from creepkit.readers.names import NAMES_OF
+from creepkit.readers.vocabulary import words_of
 from creepkit.records import Channel, InstrumentFormat, InstrumentRecord
 from creepkit.records.plugin_calls import call_on_file, named_one, only_one
 

@@ -30,7 +30,6 @@ from creepkit.readers.derived_records import (
     as_plain_bar,
     from_loading_on,
     length_said,
-    modulus_of_ramp,
     up_to_rupture,
     with_changes_of_lengths,
     without_loading,
@@ -52,11 +51,12 @@ from creepkit.readers.ends_of_tests import (
 )
 from creepkit.readers.frames import UNUSED, TableFrames, column_question, read_frames, without_missing_readings
 from creepkit.readers.imposed import read_loading, read_temperature
+from creepkit.readers.moduli import elastic_stated, first_modulus, take_modulus_by_temperature
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.standard_names import in_standard_keys, in_standard_names, specimen_named
 from creepkit.readers.table import CellTable, SourceText
-from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, words_of
+from creepkit.readers.weak_sources import with_weak_sources
 from creepkit.records import (
     SECONDS_PER_HOUR,
     UNKNOWN_DURATION,
@@ -117,6 +117,7 @@ def assemble_history(
     raise_all(errors)
     assert loading is not None
     assert temperature is not None
+    take_modulus_by_temperature(conditions, temperature)
     is_named = conditions.states("specimen")
     specimen, outputs = _specimen_and_outputs(conditions, frames, loading.quantity, columns)
     _record_place(conditions, table, specimen)
@@ -124,19 +125,19 @@ def assemble_history(
     strain_measure = conditions.take_choice(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
-    used, elastic = _used_frames(conditions, frames), _elastic(conditions, frames, loading)
+    used, elastic = _used_frames(conditions, frames), elastic_stated(conditions, frames, loading)
     if "strain" in outputs and loading.quantity == "stress" and _is_compression(conditions, name):
         loading, outputs["strain"] = _as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
     if "strain" in outputs:
         stress = loading.program().at(frames.times) if loading.quantity == "stress" else None
-        modulus = None if elastic is None else _modulus(elastic, temperature)
+        modulus = None if elastic is None else first_modulus(elastic, temperature)
         record = without_loading(conditions, frames.times, outputs["strain"], used, stress, modulus)
         outputs["strain"], used, elastic_included = record.strain, record.used, record.includes_elastic
         if record.modulus is not None:  # that the loading ramp showed
             conditions.put_number("modulus", StatedNumber(record.modulus, "modulus", location))
-            elastic = _elastic(conditions)
+            elastic = elastic_stated(conditions)
     else:
         stated = conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
         elastic_included = stated == "yes"
@@ -176,7 +177,7 @@ def _stated_fields(conditions: StatedConditions, name: str, elastic: Elastic | N
     minimum_rate, minimum_rate_sd = _minimum_rate(conditions)
     return {
         "name": conditions.take_text("name", name),
-        "elastic": elastic or _elastic(conditions),
+        "elastic": elastic or elastic_stated(conditions),
         "geometry": conditions.geometry,
         "operator": conditions.take_text("operator"),
         "alloy": conditions.take_text("alloy"),
@@ -230,7 +231,8 @@ def assemble_without_frames(
         )
     duration = (time or end or StatedNumber(UNKNOWN_DURATION, "", location)).value
     only = TableFrames(CellTable(Path(source), ()), {"time": np.array([duration])}, np.array([0]))
-    loading = read_loading(conditions, only)
+    loading, temperature = read_loading(conditions, only), read_temperature(conditions, only)
+    take_modulus_by_temperature(conditions, temperature)
     strain_measure = conditions.take_choice("strain_measure", ("engineering", "logarithmic"), required=rate_known)
     conditions.take_choice("includes_elastic", ("yes", "no"), required=False)
     named = conditions.take_text("specimen", conditions.default_specimen)
@@ -240,7 +242,7 @@ def assemble_without_frames(
             times=only.times,
             outputs={},
             loading=loading,
-            temperature=read_temperature(conditions, only),
+            temperature=temperature,
             strain_measure="logarithmic" if strain_measure == "logarithmic" else "engineering",
             source=source,
             rupture_time=None if time is None else time.value,
@@ -323,7 +325,7 @@ def _time_and_end(
     return time, "".join(said), False
 
 
-_HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?)(?!\w)", re.IGNORECASE)
+_HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?|ore|horas)(?!\w)", re.IGNORECASE)
 """A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
 
 
@@ -355,12 +357,6 @@ def _minimum_rate(conditions: StatedConditions) -> tuple[float | None, float | N
 def _refuse_unknown_specimen(named: str, terms: Terms, location: str) -> None:
     if named and named not in terms.outputs and (near := get_close_matches(named, terms.outputs, 1, cutoff=0.8)):
         raise HistoryError(f"{location}: there is no specimen '{named}'; did you mean '{near[0]}'?")
-
-
-def _modulus(elastic: Elastic, temperature: float | Program) -> float:
-    """Young's modulus at the beginning, MPa."""
-    start = temperature.values[0] if isinstance(temperature, Program) else temperature
-    return float(elastic.at(float(start)).E)
 
 
 _BY_ITS_COLUMNS = "specimen {} by its columns with lengths by default: "
@@ -423,8 +419,12 @@ def questions_of_assumed(history: History) -> list[Question]:
     path, lengths = Path(history.source.partition(" (")[0]), lengths_by_default(history.specimen, history.geometry)
     what = f"no specimen is stated, and the columns are those of {history.specimen}; which is it?"
     asked: list[tuple[str, str, str | float]] = [] if is_named else [(what, "specimen", history.specimen)]
+    if history.loading.quantity == "strain" and history.elastic is None:
+        asked.append(("Young's modulus is not stated, by which stress relaxes; how many GPa is it?", "modulus_GPa", ""))
     asked += [(f"{one} is not stated; how many mm is it?", f"{one}_mm", mm) for one, mm in lengths.items()]
-    return [Question(path, str(path), what, key, (likely,), is_free=True) for what, key, likely in asked]
+    choices = ((likely,) if likely else () for *_, likely in asked)
+    named = zip(asked, choices, strict=True)
+    return [Question(path, str(path), what, key, likely, is_free=True) for (what, key, _), likely in named]
 
 
 _SOME_OUTPUTS = "of a specimen, such as strain_pct, stress_MPa (relaxation), deflection_mm, elongation_mm, amplitude_mm"
@@ -462,32 +462,6 @@ def _refuse_unread_columns(frames: TableFrames, read_columns: Collection[str], k
         written = (table.as_written(k) for k, name in enumerate(table.columns) if known.quantity(name) == quantity)
         errors.append(column_question(table, what, dict.fromkeys(written, UNUSED)))
     raise_all(errors)
-
-
-def _elastic(
-    conditions: StatedConditions, frames: TableFrames | None = None, loading: Loading | None = None
-) -> Elastic | None:
-    """The elastic data that are stated; of a test with imposed strain else those of its loading ramp."""
-    modulus = conditions.take_number("modulus")
-    if modulus is None and frames is not None and loading is not None and loading.quantity == "strain":
-        if not {"strain", "stress"} <= frames.values.keys():
-            return None
-        found = modulus_of_ramp(loading.program().at(frames.times), frames.values["stress"])
-        if found is None:
-            raise conditions.missing_error(
-                "Young's modulus, and no loading ramp that shows it",
-                "write modulus_GPa: the stress is E (strain - creep)",
-            )
-        modulus = StatedNumber(found[0], "modulus", conditions.location)
-        conditions.record_assumption(found[1])
-    if modulus is None:
-        return None
-    # Here, not above: the record of elasticity brings sympy, which listing the readers must not wait for.
-    from creepkit.language.elastic import Elastic
-
-    poisson = conditions.take_number("poisson")
-    with errors_located_at(modulus.location):
-        return Elastic(modulus.value) if poisson is None else Elastic(modulus.value, poisson.value)
 
 
 def _standard_deviations(
@@ -551,11 +525,11 @@ def _end_of_test(
 # ---- compression -----------------------------------------------------------------------------------------------------
 
 
-_COMPRESSION = re.compile(r"\bcompress(?:ion|ive|ed)\b|druckkriech|stauchversuch", re.IGNORECASE)
+_COMPRESSION = re.compile(r"\bcompres(?:s(?:ion|ive|ed|ione)|i[oó]n)\b|druckkriech|stauchversuch", re.IGNORECASE)
 """Of a test that presses, in English, French and German; a compressor disc is none."""
 
 
-_TENSION = re.compile(r"tensi|traction|zug", re.IGNORECASE)
+_TENSION = re.compile(r"tensi|traction|trazione|tracci|zug", re.IGNORECASE)
 """Beside them of a machine for both."""
 
 

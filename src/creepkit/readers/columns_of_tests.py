@@ -1,8 +1,8 @@
 """Columns of a table with one row a test: what their names mean, in which rows the names stand, where the tests begin.
 
-Names are understood in English, German and French, with their unit behind `_`, `,` or `/`, in brackets, or in a row of
-its own. Rows of a head may stand in any order; a name may stand above several columns, as `Time to strain (h)` does
-above `0.2 %` and `1 %`.
+Names are understood in English, German, French, Italian and Spanish, with their unit behind `_`, `,` or `/`, in
+brackets, or in a row of its own. Rows of a head may stand in any order; a name may stand above several columns, as
+`Time to strain (h)` does above `0.2 %` and `1 %`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,10 @@ from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column, plain_words
+from creepkit.readers.names import NAME_SYNONYMS, NAMES_OF, SYMBOLS
 from creepkit.readers.table import CellTable, TableRow
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
-    NAMES_OF,
-    SYMBOLS,
     NameTable,
     names_tests,
     plain_name,
@@ -101,11 +100,15 @@ class TestColumn:
 
 
 _IS_TIME = re.compile(
-    r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours)\b|zeit\b"
+    r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours"
+    r"|tempo|tiempo|ore|horas?|durata|duracion|vita|vida|giorni|dias)\b|zeit\b"
 )
-RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b")
+RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b|velocit(?:a|y)\b|velocidad\b")
 _OF_MINIMUM = re.compile(r"\b(?:min\w*|mcr|steady|second\w*|station\w*|sekund\w*|lowest|smallest|kleinste\w*)\b")
-_CREEP_RATE = re.compile(r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*) ?)+")
+_CREEP_RATE = re.compile(
+    r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*|velocita|velocidad|di|deformazione"
+    r"|fluencia|deformacion) ?)+"
+)
 _ANOTHER_RATE = re.compile(
     r"\b(?:average\w*|avg|mean|mittler\w*|durchschnitt\w*|moyenne?|tertia\w*|prima\w*|initial\w*|anfang\w*|final\w*"
     r"|start|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
@@ -117,17 +120,19 @@ _RATE_SYMBOL = re.compile("[εɛe]\u0307[ _]?(?:min|ss?|m|st|c)?")
 """A dot above the strain, its letters apart from their accents."""
 
 
-_OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine)\b")
+_OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine|rottura|rotura)\b")
 _OF_NO_TEST = re.compile(
     r"\b(?:specified|specification|required|requirement|expected|predict\w*|calculat\w*|computed|estimat\w*|extrapol\w*"
     r"|min(?:imum|imal\w*)?|minimale|guaranteed|design|target|theoretical|allow\w*|nominal|planned|soll\w*|mindest\w*"
     r"|gefordert\w*|vorhergesagt\w*|berechnet\w*|erwartet\w*|geschatzt\w*|geplant\w*|prev[iu]\w*|calculee?s?|estimee?s?"
-    r"|exigee?s?|requise?s?|specifiee?s?|attendue?s?|theorique)\b"
+    r"|previst\w*|calcolat\w*|calculad\w*|stimat\w*|estimad\w*|richiest\w*|requerid\w*|exigee?s?|requise?s?|specifiee?s?|attendue?s?|theorique)\b"
 )
 """Of what was asked of a test, or is that of a model."""
 
 
-_OF_OTHERS = re.compile(r"elong|dehnung\b|strain\b|allong|parameter|ratio|log|sd\b|std|error|stress\b|date|datum")
+_OF_OTHERS = re.compile(
+    r"elong|dehnung\b|strain\b|allong|allung|alarg|parameter|ratio|log|sd\b|std|error|stress\b|date|datum"
+)
 _FACTOR = re.compile(
     r"[x×*·]?\s*(?<![\d.])(?:10\s*\^?\s*([\-−]\d+|⁻[⁰¹²³⁴-⁹]+)|1[eE](-\d+)"
     r"|(?<!/)(?<!/ )(?:10\s*\^?\s*(\+\d+|(?<=\^)\d+|(?<=\^ )\d+|⁺?[⁰¹²³⁴-⁹]+)|1[eE](\+?\d+)))\s*"
@@ -136,9 +141,13 @@ _FACTOR = re.compile(
 positive one behind a stroke belongs to the time there: %/10^3 h."""
 
 
-_PER_CENT = r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|pour ?cent\b)"
+_PER_CENT = r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|pour ?cent\b|per ?cento\b|por ?ciento\b)"
 _SYMBOL_TO_STRAIN = re.compile(rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?", re.IGNORECASE)
-_UNIT_IN_NAME = {"h": r"hours?|hrs?|stunden|heures?", "d": r"days|tage|jours", "min": r"minutes|minuten"}
+_UNIT_IN_NAME = {
+    "h": r"hours?|hrs?|stunden|heures?|ore|horas",
+    "d": r"days|tage|jours|giorni|dias",
+    "min": r"minutes|minuten",
+}
 
 
 @lru_cache(maxsize=4096)
@@ -163,6 +172,8 @@ def column_called(written: str) -> TestColumn:
             "temperature" if unit in TEMPERATURE.units or (name == "T" and not unit) else "end_time", unit
         )
     quantity, whole = _meaning(name, unit == "pct"), _meaning(written, is_per_cent=False)
+    if NAME_SYNONYMS.get(words_of(name)) == "force" and unit in STRESS.units:
+        return TestColumn("stress", unit)  # "Load (MPa)"
     text = whole if whole in TEXTS else quantity if unit in ("", "pct") else ""
     if quantity not in QUANTITIES and (text or not (quantity := _quantity_by_words(name, unit))):
         return TestColumn(text)
@@ -198,7 +209,7 @@ def _quantity_by_words(name: str, unit: str) -> str:
 def is_bare_rate(name: str) -> bool:
     """Whether a name is that of a creep rate of which it does not say that it is the smallest."""
     plain = plain_words(name)
-    return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech", plain) is not None
+    return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech|fluencia", plain) is not None
 
 
 def _strain_reached(written: str) -> float | None:
@@ -252,6 +263,7 @@ _NUMBER_LIKE = re.compile(
     r"(?:[<>≥≤~≈(\[]|>=|ca\.? )*\s*[+-]?\d[\d.,'’\s]*(?:[eEdD][+-]?\d+)?\s*(?:[+*)\]†‡#→h]|->|\.\.\.|…)*"
 )
 _WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*(\S{1,6})")
+_ASSIGNED = re.compile(r"[^()\[\]=]+=\s*[\d.,]+\s*\S{1,6}")  # "E = 170 GPa"
 _SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
 """Rows within which the tests must begin; rows of a head; and of a table whose tests stand in columns."""
 
@@ -314,7 +326,7 @@ def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
     is_head = len(set(filled)) > 1 or bool(unit_suffix(filled[0]))
-    return is_head and not any(_is_measured(cell, dialect) for cell in filled)
+    return is_head and not any(_is_measured(cell, dialect) or _ASSIGNED.fullmatch(cell) for cell in filled)
 
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:

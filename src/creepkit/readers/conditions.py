@@ -19,6 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from creepkit.errors import CreepkitError, HistoryError, quoted
+from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.readers.ends_of_tests import (
     FIRM,
     INTERRUPTED,
@@ -33,7 +34,6 @@ from creepkit.readers.ends_of_tests import (
 from creepkit.readers.frames import TableFrames
 from creepkit.readers.questions import Answer, Question, collected, raise_all
 from creepkit.readers.table import SourceText
-from creepkit.readers.table_heads import LOAD_AGREEMENT, TEMPERATURE_AGREEMENT, conditions_in_text
 from creepkit.readers.vocabulary import (
     CLOSE_SPELLING,
     SPECIMEN_NAME_PATTERN,
@@ -45,6 +45,7 @@ from creepkit.readers.vocabulary import (
     unit_suffix,
     value_in,
 )
+from creepkit.readers.weak_sources import LOAD_AGREEMENT, TEMPERATURE_AGREEMENT, conditions_in_text
 from creepkit.records import History, Program
 from creepkit.records.quantities import LENGTH, TEMPERATURE, TIME, QuantityKind
 from creepkit.records.units import time_text
@@ -257,6 +258,14 @@ class StatedConditions:
             _length(name, entry, self.terms, is_free=False)
             misspelt = self._misspelt(key) if key.strip() else ""
             says_end = kind_of_column(key) in (*FIRM, "remark") and not misspelt.startswith("rupture_")
+            near = self.terms.suggestion(key) or self.terms.suggestion(base)
+            is_asked = columns_as_labels and near and not (says_end or misspelt)
+            if is_asked and is_number(entry.text, Dialect(decimal=entry.decimal)):
+                near = f"{base}_mm" if base in self.terms.dimensions else near
+                what = (
+                    f"'{quoted(key, 60)}' holds numbers and is no known name; did you mean '{near}', or is it a label?"
+                )
+                raise self.question(what, "columns", {key: LABEL}, location=entry.location)
             is_label = says_end or (columns_as_labels and not misspelt)
             if not (key.strip() and is_label):
                 meant = misspelt or self.terms.suggestion(key)

@@ -45,8 +45,8 @@ from creepkit.readers.ends_of_tests import INTERRUPTED, RUPTURED, STOPPED, end_s
 from creepkit.readers.frames import UNUSED, TableFrames, column_question
 from creepkit.readers.imposed import OUTLIERS, PAUSE, hold_begins, under_load, unloaded
 from creepkit.readers.table import SourceText
-from creepkit.readers.table_heads import LOAD_AGREEMENT
 from creepkit.readers.vocabulary import split_written_name, value_in
+from creepkit.readers.weak_sources import LOAD_AGREEMENT
 from creepkit.records.loading import Program
 from creepkit.records.quantities import LENGTH, STRAIN, TIME
 from creepkit.records.reading_noise import noise_of_readings

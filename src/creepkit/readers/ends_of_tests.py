@@ -1,4 +1,5 @@
-"""How a test ended, by rupture or before it, from what laboratories write of it in English, German and French.
+"""How a test ended, by rupture or before it, from what laboratories write of it in English, German, French, Italian and
+Spanish.
 
 A text is taken apart into clauses and words without accents. Words of rupture count unless they are negated ("not yet
 broken", "kein Bruch", "pas de rupture") or said to lie ahead ("removed before rupture"). A column is decided by the
@@ -39,33 +40,36 @@ _RUPTURE = (
     r"|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?|bricht"
     r"|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
     r"|bris(?:e|ee|es|ees|er|ure)|defaillance"
+    r"|rott[aoei]|rottur[ae]|spezzat\w*|cedut[aoei]|fratturat\w*|rot[ao]s?|rotura|rompio|fracturad\w*|quebrad\w*"
 )
-_CENSORED = r"(?:right |left )?cens(?:or\w*)?|censur\w*|zensi?er\w*|suspen[sd]\w*"
+_CENSORED = r"(?:right |left )?cens(?:or\w*)?|censur\w*|zensi?er\w*|suspen[sd]\w*|sospes\w*"
 _GOES_ON = (
     rf"run ?outs?|(?:failure|rupture|fracture) free|{_CENSORED}|unbroken|unfailed"
     r"|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
     r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
     r"|un(?:ge|zer)broch\w*|disc(?= ?(?:\||$))|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours"
-    r"|en essai|essai continu\w*"
+    r"|en essai|essai continu\w*|in corso|in prova|en curso|en ensayo|continua"
 )
 _INTERRUPTED = (
     r"broken off|interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*"
     r"|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
     r"|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch|abbruch|intakt\w*|arret\w*|stoppe\w*"
     r"|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*"
+    r"|interrott\w*|interrumpid\w*|fermat\w*|detenid\w*|parad[ao]|smontat\w*|desmontad\w*|scaricat\w*|descargad\w*"
 )
 _NOT = (
     r"no|not|non|none|never|without|(?:did|has|does|was|had|is|have)n ?t|yet to|nicht|kein\w*|ohne|nie|pas|sans|jamais"
-    r"|aucun\w*|nein"
+    r"|aucun\w*|nein|senza|sin|nessun\w*|ningun\w*|nunca"
 )
 _FILLERS = (
     r"(?: (?:yet|a|any|been|be|has|have|the|specimen|sample|test|bar|probe|noch|der|die|den|de|d|la|l|le|ete|encore|est"
-    r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due|bis|jusqu|au|a|zu))*"
+    r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due|bis|jusqu|au|a|zu"
+    r"|si|e|stat[ao]|il|lo|provino|campione|ha|se|probeta|muestra|el|ancora|aun|todavia))*"
 )
 _NO_READING = "".join(f"(?<!{one} )" for one in ("reading", "value", "point", "frame", "messung", "messwert", "mesure"))
-_AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor"
+_AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor|prima d(?:i|ella)|antes de(?: la)?"
 _EXPECTED = _words(
-    r"before|prior|avant|vor|bevor|could|would|might|may|should|konnte|pourrait|nearly|almost",
+    r"before|prior|avant|vor|bevor|prima|antes|quasi|casi|could|would|might|may|should|konnte|pourrait|nearly|almost",
     rf"(?:near(?:ing)?|close to){_FILLERS} (?:{_RUPTURE})",
     r"imminent|expected|likely|will|soon|kurz vor|fast|still|noch|yet|encore|toujours|pending|outstanding|aus",
     r"beinahe|erwartet|bald|wird|soll|presque|proche|prevue?|attendue?|bientot|if",
@@ -84,7 +88,10 @@ _UNCENSORED = re.compile(rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_CENSORED})|un(?:
 _NOT_INTERRUPTED = re.compile(
     rf"(?<!\w)(?:(?:{_NOT}|plus|no longer){_FILLERS} (?:{_GOES_ON}|{_INTERRUPTED})|lauft (?:nicht|nimmer))(?!\w)"
 )
-_ENDED = _words(r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date")
+_ENDED = _words(
+    r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date",
+    r"concluid\w*|conclus\w*",
+)
 _DOUBTFUL = _words(
     r"unloading|removal|dismount\w*|cooling|reload\w*|restart\w*|ausbau|entlasten|abkuhlen|demontage|dechargement",
     r"furnace|oven|thermocouples?|tc|power|mains|grips?|machine|rig|heaters?|heating|controller|extensometer|lvdt",
@@ -158,6 +165,7 @@ def end_said_by(text: str) -> str:
 _INVALID = re.compile(
     r"(?:do not|don.?t|not to be|never) use|not usable|^\W*void\W*$|\b(?:test|result) (?:is )?(?:void|invalid)\b"
     r"|\b(?:void|invalid) (?:test|result)|ungültig|nicht (?:verwenden|verwertbar|auswerten)|à (?:exclure|écarter)"
+    r"|non valid[ao]|no válid[ao]|non usare|no usar|da escludere"
     r"|ne pas utiliser|non valide|not valid|disregard|verworfen|\binvalid\b|\bessai (?:nul|invalide)\b",
     re.IGNORECASE,
 )
@@ -178,7 +186,30 @@ def invalidity_said_by(text: str) -> Literal["invalid", "elsewhere", ""]:
 
 
 YES = frozenset(
-    ("1", "1.0", "1,0", "yes", "y", "ja", "j", "oui", "o", "true", "wahr", "vrai", "t", "x", "*", "+", "✓", "✔", "✗")
+    (
+        "1",
+        "1.0",
+        "1,0",
+        "yes",
+        "y",
+        "si",
+        "sì",
+        "sí",
+        "ja",
+        "j",
+        "oui",
+        "o",
+        "true",
+        "wahr",
+        "vrai",
+        "t",
+        "x",
+        "*",
+        "+",
+        "✓",
+        "✔",
+        "✗",
+    )
 )
 NO = frozenset(("0", "0.0", "0,0", "no", "n", "nein", "non", "false", "falsch", "faux"))
 """Values of a column that says yes or no, in small letters."""
@@ -199,21 +230,22 @@ _CODES: Mapping[frozenset[str], Mapping[str, str]] = {
 
 _STATUS_WORDS = _words(
     r"status|statut|state|etat|zustand|result|resultat|ergebnis|outcome|ende|end|ended|ending|fin|issue",
-    r"termination|versuchsende|prufende|prufstatus|abbruchgrund|versuchsstatus|code|versuchsausgang|ausgang",
+    r"esito|stato|estado|risultato|resultado|termination|versuchsende|prufende|prufstatus|abbruchgrund|versuchsstatus|code|versuchsausgang|ausgang",
     r"endart|motif|abschaltgrund|stoppgrund|endgrund|reason|grund",
 )
 _STATUS_FILLERS = _words(
     r"test|of|the|specimen|sample|final|de|l|d|essai|der|des|probe|versuch|prufung|reason|for|type|how|it|why",
-    r"grund|du|arret|eprouvette|versuchs|mode|art|end|at",
+    r"della|prova|provino|del|ensayo|di|fine|grund|du|arret|eprouvette|versuchs|mode|art|end|at",
 )
 _REMARK_WORDS = _words(
     r"remark|remarks|note|notes|comment|comments|bemerkung|bemerkungen|anmerkung|bem|anmerkungen|kommentar",
     r"kommentare|hinweis|hinweise|notiz|notizen|remarque|remarques|observation|observations|commentaire",
-    r"commentaires|rem|anm|beobachtung|beobachtungen|meldung|meldungen|message|messages",
+    r"nota|notas|osservazion[ei]|commento|commenti|observacion(?:es)?|comentarios?|annotazioni|commentaires|rem|anm|beobachtung|beobachtungen|meldung|meldungen|message|messages",
 )
 _OTHER_USES = _words(
     r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
-    r"position|lage|mode|type|typ|ort|appearance|allongement|rate|(?:kriech)?(?:rate|geschwindigkeit)|vitesse",
+    r"tempo|tiempo|durata|duracion|vita|vida|ore|horas|carico|carga|sforzo|tensione?|deformazione|deformacion|velocita",
+    r"velocidad|allungamento|alargamiento|posizione|posicion|zona|position|lage|mode|type|typ|ort|appearance|allongement|rate|(?:kriech)?(?:rate|geschwindigkeit)|vitesse",
 )
 """Words beside one of rupture that make the name of a column that of a quantity or a description."""
 
@@ -244,7 +276,8 @@ _BEFORE_RUPTURE = _words(
     r"early|late|premature\w*|suddenly?|complete\w*|fully?|partial\w*|clean|shear|tensile|cone|metal|haz|iv|material",
     r"base|parent|found|ended|ends?|ran|on|due|time|h|hours?|days?|reached|steel|alloy|not|ist|wurde|war|hat|bis|zum|zu",
     r"nach|durch|mit|am|dann|endgultig\w*|prufling|probekorper|stab|werkstoff|vorzeitig\w*|est|ete|s|eprouvettes?|apres",
-    r"puis|par|jusqu|en|brutale?|nette|finale?|prematuree?|essai|metaux|duktiler|l",
+    r"provin[oi]|provett[ae]|campion[ei]|prova|probetas?|muestras?|ensayo|ha|hanno|se|si|e|stat[ao]|da|di|alla?|del(?:la)?",
+    r"dopo|ore|tras|despues|horas|con|regolare|normale|a|puis|par|jusqu|en|brutale?|nette|finale?|prematuree?|essai|metaux|duktiler|l",
 )
 """Words that stand before one of rupture where the specimen broke: any other is of what else did."""
 

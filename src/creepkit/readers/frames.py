@@ -103,10 +103,13 @@ def read_frames(
         notes.append("times since the first reading")
     if _COMPRESSION in notes and "strain" in values and values["strain"].max() <= 0.0:
         values["strain"] = -values["strain"]
-    if "x" in map(str.casefold, found.values()) and (np.diff(values["time"]) < 0.0).any():
+    falls = -np.diff(values["time"]).min(initial=0.0)
+    is_plot = "x" in map(str.casefold, found.values())
+    if falls > 0.0 and (is_plot or falls <= LARGEST_FALL * np.ptp(values["time"])):
         order = np.argsort(values["time"], kind="stable")
         values = {name: one[order] for name, one in values.items()}
-        notes.append("points of a plot in order of time")
+        what = "points of a plot" if is_plot else f"readings of which some fall by up to {falls:g} s"
+        notes.append(f"{what} in order of time")
     for quantity, several in sensors.items():
         if len(several) > 1:
             apart, unit = np.ptp([*several.values()], axis=0).max(), next(iter(kinds[quantity].units))
@@ -114,6 +117,10 @@ def read_frames(
     table = table.assuming(*notes)
     imposed = [values[name] for name in (*terms.number_kinds, "temperature") if name in values]
     return _strictly_increasing(_without_readings_before_steps(TableFrames(table, values, table.lines), imposed))
+
+
+LARGEST_FALL = 0.01
+"""Of the span of the times, by which one may fall below the one before, as points of a digitised curve do."""
 
 
 LARGEST_SHARE_MISSING = 0.1

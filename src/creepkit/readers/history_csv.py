@@ -21,7 +21,7 @@ error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -34,13 +34,16 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history, assemble_without_frames
 from creepkit.readers.conditions import noise_correlation_text
-from creepkit.readers.parts_of_tests import read_tests
-from creepkit.readers.questions import collected, raise_all
-from creepkit.readers.table import CellTable
-from creepkit.readers.table_heads import is_frame, names_time, sources_of_names
+from creepkit.readers.parts_of_tests import read_tests, with_clocks_joined
+from creepkit.readers.questions import ANSWERS_FILE, collected, raise_all
+from creepkit.readers.remarks import notes_by_name
+from creepkit.readers.table import CellTable, SourceText
+from creepkit.readers.table_heads import is_frame, names_time
 from creepkit.readers.table_layouts import TabulatedTest
+from creepkit.readers.tests_file import EXCLUDE
 from creepkit.readers.text_files import peek_table, read_head_alone
 from creepkit.readers.vocabulary import SPECIMEN_NAME_PATTERN, HeaderVocabulary, Terms, split_unit
+from creepkit.readers.weak_sources import sources_of_names
 from creepkit.records import (
     UNKNOWN_DURATION,
     History,
@@ -97,23 +100,29 @@ def _has_numbers(grid: CellTable) -> bool:
 TABLE_SUFFIXES, TEXT_SUFFIXES = (".csv", ".tsv", ".lvm"), (".txt", ".dat", ".asc", ".prn", ".tra")
 """Endings of files that are taken for tables, and of those that are where a column of time is among the first names."""
 
-
 HISTORY_CSV = HistoryCsvReader("csv", "a table as text: `# key: value` lines, then columns such as time_s,strain_pct")
 
 
 def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: HeaderVocabulary) -> list[History]:
     """The histories of the tests in one file; those without a name have that of their sheet or of the file."""
-    tests = list(found)
-    sheets = {test.table.sheet for test in tests}
-    names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
+    tests = with_clocks_joined(list(found), path, vocabulary)
+    names = _names_of(tests, path)
     errors, histories = list[HistoryError](), list[History]()
     tests = [
         replace(one, table=replace(one.table, sources=(*one.table.sources, *sources_of_names(one.table, vocabulary))))
         for one in tests
     ]
     _refuse_one_for_all(tests, vocabulary)
-    for test, name in zip(tests, names, strict=True):
-        table = test.table
+    notes = notes_by_name([test.entries for test in tests], names) if tests else ()
+    stated = [vocabulary.of_tests.get(name, {}) for name in names]
+    excluded = [
+        f"without {name} ({own[EXCLUDE][0]})" for name, own in zip(names, stated, strict=True) if EXCLUDE in own
+    ]
+    for said, own, test, name in zip(stated, notes, tests, names, strict=True):
+        if EXCLUDE in said:
+            continue
+        test = _with_answers(replace(test, entries=own), said, vocabulary.terms())
+        table = test.table.assuming(*excluded)
         unique = f"{table.sheet}/{name}" if len(set(names)) < len(names) and table.sheet else name
         parts = [f"sheet {table.sheet}"] * bool(table.sheet) + [test.name] * bool(test.name)
         source = f"{path} ({', '.join(parts)})" if parts and len(tests) > 1 else str(path)
@@ -122,6 +131,37 @@ def histories_of_tests(found: Iterable[TabulatedTest], path: Path, vocabulary: H
         histories += [] if history is None else [history]
     raise_all(errors)
     return histories
+
+
+def _with_answers(test: TabulatedTest, stated: Mapping[str, tuple[str, str]], known: Terms) -> TabulatedTest:
+    """The test with what a file of answers states of it alone, in the place of what its own file states."""
+
+    def quantity(key: str) -> str:
+        found = split_unit(known.condition(key), known.conditions.kinds)
+        return found[0] if found else known.condition(key)
+
+    said = {*map(quantity, stated)}
+    others = {key: entry for key, entry in test.entries.items() if quantity(key) not in said}
+    own = {key: SourceText(text, place) for key, (text, place) in stated.items()}
+    notes = (f"{key} {entry.text} of {ANSWERS_FILE}" for key, entry in own.items())
+    return replace(test, entries={**others, **own}, table=test.table.assuming(*notes))
+
+
+def _names_of(tests: Sequence[TabulatedTest], path: Path) -> list[str]:
+    """The names of tests; those without one have that of their sheet or of the file, with a number where it is twice.
+
+    HistoryError where two are called the same.
+    """
+    sheets = {test.table.sheet for test in tests}
+    names = [test.name or (test.table.sheet if len(sheets) > 1 else path.stem) for test in tests]
+    places = [(test.table.sheet, name) for test, name in zip(tests, names, strict=True)]
+    for k, test in enumerate(tests):
+        if places.count(places[k]) > 1 and test.name:
+            what = f"two tests are called '{quoted(test.name, 60)}'; give each its own name"
+            raise HistoryError(f"{test.table.location(test.table.columns_line)}: {what}")
+        if places.count(places[k]) > 1:
+            names[k] = f"{names[k]} ({places[: k + 1].count(places[k])})"
+    return names
 
 
 def _refuse_one_for_all(tests: Sequence[TabulatedTest], vocabulary: HeaderVocabulary) -> None:

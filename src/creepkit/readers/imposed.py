@@ -95,13 +95,17 @@ def read_loading(conditions: StatedConditions, frames: TableFrames) -> Loading:
     return loading
 
 
-_REMAINING = re.compile("remaining|residual|relaxed|relaxation|rest-?spannung|résiduelle|restante", re.IGNORECASE)
+_REMAINING = re.compile(
+    "remaining|residual|relaxed|relaxation|rest-?spannung|résiduelle|restante|residua|rimanente", re.IGNORECASE
+)
 
 
 def _ask_of_relaxation(conditions: StatedConditions, frames: TableFrames) -> None:
-    """Ask for the strain that was held in a test whose column is called the remaining stress."""
+    """Ask for the strain that was held in a test whose column is called the remaining stress, or is all it recorded."""
     written = next((frames.table.as_written(k) for k, c in enumerate(frames.table.columns) if c[:6] == "stress"), "")
-    if not _REMAINING.search(written) or "strain" in frames.values:
+    known = {name for outputs in conditions.terms.outputs.values() for name in outputs}
+    is_alone = known & frames.values.keys() == {"stress"} and np.ptp(frames.values["stress"]) > 0.0
+    if not (_REMAINING.search(written) or is_alone) or "strain" in frames.values:
         return
     if conditions.states_load("strain"):
         conditions.take_number("stress")  # the initial one, which is the first that is recorded

@@ -2,7 +2,8 @@
 
 Where the times of each part go on from those of the part before, the frames follow one another. Where the clock begins
 anew it is asked whether the parts are one test, `parts` in tests.toml: `joined`, each part begins where the one before
-ended, in time and in strain; or `separate`, tests of their own.
+ended, in time and in strain; or `separate`, tests of their own. The same is asked of one file, where the clock begins
+anew between two of its rows or blocks.
 """
 
 from __future__ import annotations
@@ -135,15 +136,27 @@ def _joined(
             if not entry.says_the_same(other):
                 what = f"'{key}' is {quoted(entry.text)}, and in part 1 {quoted(other.text)}; parts of a test have one"
                 raise HistoryError(f'{entry.location}: {what}; give each its steps, or write parts = "{SEPARATE}"')
+    called = parts[0].test[0] or parts[0].path.stem
+    return _on_one_clock(tests, known, path, "; ".join(one.path.name for one in parts), called)
+
+
+def _on_one_clock(
+    tests: Sequence[TabulatedTest], known: Terms, path: Path, listed: str, called: str = ""
+) -> TabulatedTest:
+    """The test of parts with the same columns; Question where their clock begins anew, and no answer says what that is.
+
+    listed : the parts in words. called : the name of a test that has none.
+    """
+    first, rows, note = tests[0], [row for test in tests for row in test.table.rows], "whose times go on"
     columns = [known.quantity(name) for name in first.table.columns]
     time = columns.index("time") if "time" in columns else None
-    listed = "; ".join(one.path.name for one in parts)
-    rows, note = [row for test in tests for row in test.table.rows], "whose times go on"
     if time is not None and _begins_anew(tests, time):
         if answers_of(path).parts != JOINED:
-            what = "is a part of a test, and its clock begins anew: are the parts one test, each from where the one "
-            what += "before ended, in time and strain, or tests of their own?"
-            raise Question(path, str(path), what, "parts", (JOINED, SEPARATE))
+            what = "is a part of a test" if called else "the test goes on here"
+            what += ", and its clock begins anew: are the parts one test, each from where the one before ended, in "
+            what += "time and strain, or tests of their own?"
+            place = str(path) if called else tests[1].table.location(tests[1].table.rows[0].line)
+            raise Question(path, place, what, "parts", (JOINED, SEPARATE))
         kinds = known.columns.kinds
         moved = [time, *(k for k, q in enumerate(columns) if q and (q.startswith("strain") or kinds[q] is LENGTH))]
         gaps = [_gap(one, other, time) for one, other in pairwise(tests)]
@@ -151,7 +164,58 @@ def _joined(
         rows = _in_one_clock([test.table for test in tests], moved, gaps)
     entries = {key: entry for test in reversed(tests) for key, entry in test.entries.items()} | dict(first.entries)
     table = replace(first.table, rows=rows).assuming(f"parts joined {note}: {listed}")
-    return TabulatedTest(first.name or parts[0].test[0] or parts[0].path.stem, entries, table)
+    return TabulatedTest(first.name or called or path.stem, entries, table)
+
+
+# ---- a clock that begins anew within a file --------------------------------------------------------------------------
+
+
+def with_clocks_joined(found: Sequence[TabulatedTest], path: Path, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
+    """The tests in one file; parts of one whose clock begins anew are joined, or tests of their own, as is said."""
+    known, tests = vocabulary.terms(), list[list[TabulatedTest]]()
+    for test in found:
+        parts = [replace(test, table=replace(test.table, rows=rows)) for rows in _between_starts(test.table, known)]
+        if tests and _may_go_on(tests[-1][-1], test, known):
+            tests[-1] += parts
+        else:
+            tests.append(parts)
+    if answers_of(path).parts == SEPARATE:
+        return [replace(one, name=_numbered(one, k, parts)) for parts in tests for k, one in enumerate(parts, 1)]
+    rows = ([f"lines {one.table.rows[0].line} to {one.table.rows[-1].line}" for one in parts] for parts in tests)
+    listed = map("; ".join, rows)
+    return [
+        parts[0] if len(parts) == 1 else replace(_on_one_clock(parts, known, path, said), name=parts[0].name)
+        for parts, said in zip(tests, listed, strict=True)
+    ]
+
+
+def _numbered(test: TabulatedTest, number: int, parts: Sequence[TabulatedTest]) -> str:
+    return f"{test.name or test.table.sheet or test.table.path.stem} ({number})" if len(parts) > 1 else test.name
+
+
+_ANEW = 0.1
+"""Of the time before, to which a clock that begins anew falls."""
+
+
+def _between_starts(table: CellTable, known: Terms) -> list[Sequence[TableRow]]:
+    """The rows between those at which the clock begins anew, and stays below where it was; a wrong digit falls once."""
+    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
+    if time is None or not all(is_number(row.cells[time], table.dialect) for row in table.rows):
+        return [table.rows]
+    hours = [float_of(row.cells[time]) for row in table.rows]
+    steps = [k for k in range(1, len(hours) - 1) if hours[k] < hours[k - 1] > hours[k + 1] and hours[k - 1] > 0.0]
+    starts = [0, *(k for k in steps if hours[k] <= _ANEW * hours[k - 1]), len(hours)]
+    return [table.rows[start:end] for start, end in pairwise(starts)]
+
+
+def _may_go_on(before: TabulatedTest, after: TabulatedTest, known: Terms) -> bool:
+    """Whether a test may be a part of the one before: of its name, its columns and its conditions."""
+    one, other = (_conditions(test, known) for test in (before, after))
+    is_alike = (before.name, before.table.sheet, [*before.table.columns]) == (
+        *(after.name, after.table.sheet),
+        [*after.table.columns],
+    )
+    return is_alike and one.keys() == other.keys() and all(one[key].says_the_same(other[key]) for key in one)
 
 
 def _conditions(test: TabulatedTest, known: Terms) -> dict[str, SourceText]:

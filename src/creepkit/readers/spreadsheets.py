@@ -40,10 +40,11 @@ from creepkit.readers.table import (
     refuse_long_cells,
     without_ignored,
 )
-from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, names_time
+from creepkit.readers.table_heads import HeadOfTest, names_time
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
 from creepkit.readers.tests_file import SEPARATE, answers_of
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, unit_suffix, words_of
+from creepkit.readers.weak_sources import conditions_in_text
 from creepkit.records import History
 
 SPREADSHEET_SUFFIXES = (".xlsx", ".xlsm")

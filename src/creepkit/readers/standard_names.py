@@ -25,10 +25,10 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve, through_midnight
+from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
 from creepkit.readers.vocabulary import (
-    STATED_BY_NAME,
     HeaderVocabulary,
     Terms,
     plain_name,
@@ -98,9 +98,13 @@ def specimen_named(entries: Mapping[str, SourceText], vocabulary: HeaderVocabula
 
 def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[str, SourceText]:
     """Entries under creepkit's names of their keys, with the units that stand in their texts."""
-    stated: dict[str, SourceText] = {}
+    stated, moduli = dict[str, SourceText](), list[SourceText]()
     for key, entry in entries.items():
         name = known.condition(key)
+        if name.startswith("modulus_at "):
+            at, _, unit = name.removeprefix("modulus_at ").partition("|")
+            moduli.append(replace(entry, text=f"{at} = {entry.text} {unit}".strip(), key=entry.key or key))
+            continue
         found = split_unit(known.vocabulary.synonyms.get(key, name), known.conditions.kinds)
         if found and (match := _VALUE_WITH_UNIT.fullmatch(entry.text)):
             suffix = unit_suffix(match[2])
@@ -114,6 +118,8 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
         if name in stated:
             raise HistoryError(f"{entry.location}: '{key}' is given twice (perhaps in two units); keep one of them")
         stated[name] = entry if name == key else replace(entry, key=entry.key or key)
+    if moduli:
+        stated["modulus_by_temperature"] = replace(moduli[0], text="; ".join(one.text for one in moduli))
     return stated
 
 

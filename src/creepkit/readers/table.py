@@ -115,13 +115,13 @@ def refuse_long_cells(place: str, cells: Sequence[str]) -> None:
 class CellTable:
     """Cells with where they stand; all still text.
 
-    rows : those that hold something and are no comment. sheet : of a spreadsheet, "" of a text. header : the entries of
-    `# key: value` lines. comments : line, key and entry of those below the first row. columns : their names, in
-    `columns_line`, where they are known. positions : the column of the file, from 0, in which each column stands, where
-    errors must tell it. written : the columns as they were written, where they were given creepkit's names.
-    assumptions : what was assumed of the table, for the label "assumed". sources : what titles and names of sheets and
-    files state of its test, which must agree with what else does. merged : row and column, from 0, of cells that are
-    merged with one above them.
+    rows : those that hold something and are no comment. sheet : of a spreadsheet, "" of a text. header : the
+    entries of `# key: value` lines. comments : line, key and entry of those below the first row; of remarks above
+    it without key. columns : their names, in `columns_line`, where they are known. positions : the column of the
+    file, from 0, in which each column stands, where errors must tell it. written : the columns as they were
+    written, where they were given creepkit's names. assumptions : what was assumed of the table, for the label
+    "assumed". sources : what titles and names of sheets and files state of its test, which must agree with what
+    else does. merged : row and column, from 0, of cells that are merged with one above them.
     """
 
     path: Path
@@ -202,7 +202,7 @@ class CellTable:
     def with_comments(self, comments: Iterable[tuple[int, Sequence[str]]], first: int) -> CellTable:
         """The table with the entries of comments, line and cells, the value of a key perhaps in the second of these.
 
-        Those above the first row stand in the header; one without a colon or a value is a remark.
+        Those above the first row stand in the header; one without a colon or a value is a remark, without a key.
         """
         header, late = dict[str, SourceText](), list[tuple[int, str, SourceText]]()
         for line, cells in comments:
@@ -215,6 +215,8 @@ class CellTable:
                 what = f"'{key}' was already given in {'line ' * where.isdigit()}{where}"
                 raise HistoryError(f"{place}: {what}; keep one of them")
             entry = SourceText(text or "".join(beside), place, self.dialect.decimal)
+            if not (colon or beside) and line < first and key:
+                late.append((line, "", replace(entry, text=key)))
             if (colon or beside) and line >= first:
                 late.append((line, key, entry))
             elif (colon or beside) and plain_name(key) != "decimal":

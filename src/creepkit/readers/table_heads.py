@@ -13,16 +13,24 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-import numpy as np
-
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.questions import ANSWERS_FILE
+from creepkit.readers.ends_of_tests import end_said_by, invalidity_said_by
+from creepkit.readers.questions import Answer
 from creepkit.readers.table import CellTable, SourceText, TableRow, with_commas_of_remarks, without_ignored
-from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, split_written_name, unit_suffix, words_of
+from creepkit.readers.vocabulary import (
+    HeaderVocabulary,
+    Terms,
+    in_unit,
+    split_unit,
+    split_written_name,
+    unit_behind,
+    unit_suffix,
+    words_of,
+)
+from creepkit.readers.weak_sources import conditions_in_text, conditions_of_head
 from creepkit.records import known_specimens
-from creepkit.records.quantities import LENGTH
 
 _MOST_ROWS, _MOST_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
@@ -120,6 +128,7 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     table = _with_stated(table, vocabulary.stated)
     known = vocabulary.terms(table.header["specimen"].text if "specimen" in table.header else "")
     at = _row_of_names(table, known)
+    table = _in_units_of_columns(table, at, known)
     line, searched = table.rows[at].line, table.rows[: at + _MOST_BELOW]
     rest = enumerate(table.rows[at + 1 :], at + 1)
     end = next((k for k, row in rest if any(is_number(cell, table.dialect) for cell in row.cells)), len(table.rows))
@@ -158,6 +167,39 @@ def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:
     return HeadedTable(below, known, written, head, whole, times)
 
 
+def _in_units_of_columns(table: CellTable, at: int, known: Terms) -> CellTable:
+    """The table with cells such as `45 min` and `3 days`, below the row of names, as numbers in one unit of the column.
+
+    Question where others of a column have no unit, and its name neither.
+    """
+    first = table.rows[at + 1 : at + _MOST_ROWS]
+    for k, name in enumerate(table.rows[at].cells):
+        kind = known.columns.kinds.get(known.quantity(name) or "") if name else None
+        if kind is None or not any(cell[-1:].isalpha() for row in first for cell in row.cells[k : k + 1]):
+            continue
+        cells = {n: row.cells[k] for n, row in enumerate(table.rows) if n > at and k < len(row.cells)}
+        written = {n: cell for n, cell in cells.items() if cell[-1:].isalpha() and unit_behind(cell, kind)}
+        if not written or 2 * len(written) < sum(map(bool, cells.values())):
+            continue
+        own = unit_suffix(split_written_name(name)[1])
+        unit = own or unit_behind(next(iter(written.values())), kind)
+        bare = next((n for n, cell in cells.items() if is_number(cell, table.dialect)), 0)
+        if bare and not own:
+            what = f"'{quoted(name, 60)}' is '{cells[bare]}' without the unit of others; which is it?"
+            choice: Answer = {name: f"{known.quantity(name)}_{unit}"}
+            raise table.question(what, "columns", choice, line=table.rows[bare].line, is_free=True)
+        numbers = {n: in_unit(cell, kind, unit, table.dialect.decimal) for n, cell in written.items()}
+        numbers[at] = name if own else f"{name} ({unit})"
+        rows = [
+            TableRow(row.line, [numbers.get(n) or cell if i == k else cell for i, cell in enumerate(row.cells)])
+            for n, row in enumerate(table.rows)
+        ]
+        changed = next((cell for cell in written.values() if unit_behind(cell, kind) != unit), "")
+        notes = [f"'{changed}' is {in_unit(changed, kind, unit, '.')} {unit}"] if changed else []
+        table = replace(table, rows=rows).assuming(*notes)
+    return table
+
+
 def _numbers_readings(table: CellTable, at: int, column: int, known: Terms) -> bool:
     """Whether a column of no known name, below the row of names, holds whole numbers that rise by one, as of frames."""
     name, rows = table.rows[at].cells[column], table.rows[at + 1 :]
@@ -183,15 +225,36 @@ def _with_stated(table: CellTable, stated: Mapping[str, tuple[str, str]]) -> Cel
 def with_entries_of_comments(table: CellTable, names_line: int, known: Terms) -> CellTable:
     """The table with the entries of comments between its first row and its names.
 
-    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere.
+    A condition in a comment below the names is refused, for it must not go unread; remarks may stand anywhere. What a
+    remark or the title of a figure, `# Fig. 4: 650 °C`, states is a weak source.
     """
-    header = dict(table.header)
+    header, sources, remarks = dict(table.header), list(table.sources), list[SourceText]()
     for line, key, entry in table.comments:
+        if not key:
+            remarks += [entry] * (line < names_line)
+            continue
         if line > names_line and known.is_condition(key):
             raise HistoryError(f"{entry.location}: '{key}' stands below the names of the columns; move it above them")
         if line < names_line and header.setdefault(key, entry) is not entry:
             raise HistoryError(f"{entry.location}: '{quoted(key, 60)}' was already given; keep one of them")
-    return replace(table, header=header)
+    titles = [key for key in header if _OF_FIGURE.match(key) and not known.is_condition(key)]
+    for title in (replace(entry, text=f"{key}: {entry.text}") for key, entry in ((k, header.pop(k)) for k in titles)):
+        header[f"label line {title.location.rpartition(':')[2]}"] = title
+        sources += conditions_in_text(title.text.partition(": ")[2], title.location, known)
+    stated = {(split_unit(known.condition(key), known.conditions.kinds) or ("",))[0] for key in header}
+    stated |= {known.quantity(cell) or "" for row in table.rows[:_MOST_ROWS] for cell in row.cells if cell}
+    for remark in remarks:
+        found = [one for one in conditions_in_text(remark.text, remark.location, known) if one.key not in stated]
+        sources += found
+        if found or end_said_by(remark.text) or invalidity_said_by(remark.text):
+            header[f"label line {remark.location.rpartition(':')[2]}"] = remark
+    return replace(table, header=header, sources=tuple(sources))
+
+
+_OF_FIGURE = re.compile(
+    r"(?:fig|figure|abb|bild|curve|kurve|plot|graph|test|series|data ?set|title|titel)\b", re.IGNORECASE
+)
+"""Beginning of a key that is a title."""
 
 
 def _is_of_head(row: TableRow, times: Sequence[int], table: CellTable, known: Terms) -> bool:
@@ -236,6 +299,9 @@ class HeadOfTest:
     entries: dict[str, SourceText] = field(default_factory=dict)
     sources: list[SourceText] = field(default_factory=list)
     assumptions: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.sources += self.table.sources
 
     def put(self, key: str, text: str, row: TableRow) -> None:
         """Add an entry under creepkit's name of its key; HistoryError where it is there already."""
@@ -287,8 +353,9 @@ class HeadOfTest:
                 value, *cells = cells
                 is_label = not (known.is_condition(plain) or known.misspelt(plain))  # nor nearly a condition
                 if cells and is_number(value, self.table.dialect) and unit_suffix(cells[0]):
-                    key, value = (key, f"{value} {cells[0]}") if is_label else (_with_unit(key, cells[0], place), value)
-                    cells = cells[1:]
+                    with_value = is_label or known.condition(plain).startswith("modulus_at ")
+                    unit, *cells = cells
+                    key, value = (key, f"{value} {unit}") if with_value else (_with_unit(key, unit, place), value)
                 self.put(f"label {plain}" if is_label else key, value, row)
             elif known.is_condition(key):
                 raise HistoryError(f"{place}: '{quoted(key)}' stands above the names of the columns without a value")
@@ -389,178 +456,3 @@ def _add_row(
         is_label = first in key_columns and len(set(filled.values())) < len(filled)
         result.put(f"label {filled[first].rstrip(': ')}" if is_label else "name", values[0], row)
         result.sources += conditions_in_text(values[0], place, known)
-
-
-# ---- conditions in titles and names ----------------------------------------------------------------------------------
-
-
-_NUMBER = r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
-_UNIT = r"[^\W\d_][^\W_]*(?:/[^\W_]+(?:\^2)?)?|[°º℃℉]\s?[A-Za-z]?|deg\.? ?[A-Za-z]"
-_VALUE = re.compile(rf"(?<![^\W_])(?<![.,])({_NUMBER})[ _]?({_UNIT})(?![^\W_]|°)")
-_ASSIGNED = re.compile(rf"([^\W\d_][\w .'-]{{0,30}}?)\s*[=:]\s*({_NUMBER})\s*({_UNIT})(?![\w°])")
-
-
-_RANGE = re.compile(r"(?<![^\W_])\d[\d.,]*\s*(?:to|bis|à|and|und|et|or|oder|-|–|/|,|;|\.\.\.?|…)\s*$", re.IGNORECASE)
-"""What makes a number the last one of several."""
-
-
-_OF_THE_MATERIAL = re.compile(
-    r"normali[sz]|temper(?:ed|ing)|anneal|(?<![^\W_])(?:ag(?:e?ing|ed)|cur(?:ed|ing))(?![^\W\d_])|solution|reflow|sinter"
-    r"|quench|forg|\brolled|\bhip(?:ped)?\b|heat.?treat"
-    r"|geglüht|vergütet|angelassen|lösungs|ausgelagert|wärmebehand|abgeschreckt|gehärtet|trempe|trempé|revenu|recuit"
-    r"|(?<![^\W_])ht[ _:-]+\d|stress.?reliev|spannungsarm|gealtert|ausgehärtet"
-    r"|vieilli|traitement|yield|strength|\buts\b|\brm\b|\brp|streckgrenze|festigkeit|melting|solidus|room temp",
-    re.IGNORECASE,
-)
-"""Words of a text whose temperatures and stresses are those of a treatment or a property."""
-
-
-_LOWEST, _ROOM = 100.0, 15.0
-_AT_TEST = re.compile(r"(?:creep|kriech|fluage|test|versuch|essai)\w*\b.*(?:\bat|\bbei|à|@)\s*$", re.IGNORECASE)
-"""Numbers of a temperature below which a text hardly means that of a creep test, unless it says so or calls it one; and
-below which the name of a file or sheet does not, as of a solder, `SAC_25C`."""
-
-
-TEMPERATURE_AGREEMENT, LOAD_AGREEMENT = 3.0, 0.03
-"""K, and a fraction of the load, by which a nominal value may differ from a measured one."""
-
-
-def conditions_of_head(cell: str, known: Terms) -> list[tuple[str, str]]:
-    """Load and temperature of a head such as `120 MPa`, or `120 MPa / 650 °C`; [] where a part of it is neither.
-
-    A load is a stress, where the file names no specimen that takes another one.
-    """
-    text = " ".join(cell.split())
-    found = [(_quantity_of(match[2], known), f"{match[1]} {match[2]}") for match in _VALUE.finditer(text)]
-    quantities = [quantity for quantity, _ in found]
-    is_all = not _VALUE.sub("", text).strip(" ,;/|@()-–")
-    return found if is_all and all(quantities) and len(set(quantities)) == len(quantities) else []
-
-
-def _quantity_of(unit: str, known: Terms) -> str:
-    suffix, kinds = unit_suffix(unit), known.condition_kinds
-    loads = known.own_loads or (("pressure",) if suffix == "bar" else ("stress",))
-    names = (name for name in ("temperature", *loads) if name in kinds and suffix and suffix in kinds[name].units)
-    return next(names, "")
-
-
-def conditions_in_text(text: str, place: str, known: Terms, *, is_name: bool = False) -> list[SourceText]:
-    """Temperature and load that a text states, once each, and lengths such as `L0 = 40 mm`, each with its key.
-
-    [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`. is_name : whether
-    it is the name of a file or sheet.
-    """
-    found: dict[str, list[str]] = {}
-    if _OF_THE_MATERIAL.search(text):
-        return []
-
-    def take(match: re.Match[str]) -> str:
-        name, suffix = known.condition(match[1].split(",")[-1].strip()), unit_suffix(match[3])
-        kind = known.conditions.kinds.get(name)
-        if kind is None:
-            return (
-                match[0] if match[0].count(":") else " ; "
-            )  # "L1-1: 40 bar" names a test, "R = 40 MPa" another stress
-        if suffix in kind.units:
-            found.setdefault(name, []).append(f"{match[2]} {match[3]}")
-        return " ; "
-
-    rest = _ASSIGNED.sub(take, text)
-    is_all = not _VALUE.sub("", rest).strip(" ,;/|@()-–_")  # a sheet called "25 °C"
-    for match in _VALUE.finditer(rest):
-        quantity = _quantity_of(match[2], known)
-        is_range = _RANGE.search(rest[: match.start()]) is not None
-        number = float(match[1].replace(",", "."))
-        is_at = is_all or _AT_TEST.search(rest[: match.start()]) is not None
-        is_at |= is_name and number >= _ROOM and "temperature" not in found
-        if unit_suffix(match[2]) in ("GPa", "Pa") or (quantity == "temperature" and number < _LOWEST and not is_at):
-            continue
-        if quantity:
-            found.setdefault(quantity, []).extend([f"{match[1]} {match[2]}"] * (1 + is_range))
-    return [SourceText(values[0], place, key=name) for name, values in found.items() if len(values) == 1]
-
-
-def sources_of_names(grid: CellTable, vocabulary: HeaderVocabulary) -> list[SourceText]:
-    """What the names of sheet and file state of a test."""
-    known, path = vocabulary.terms(), grid.path
-    named = ((grid.sheet, f"name of sheet '{grid.sheet}'"), (path.stem, "name of the file"))
-    return [one for text, what in named for one in conditions_in_text(text, f"{path}, {what}", known, is_name=True)]
-
-
-def with_weak_sources(
-    entries: Mapping[str, SourceText], table: CellTable, known: Terms
-) -> tuple[dict[str, SourceText], list[str]]:
-    """Entries with what titles and names state beside them, and what is assumed so; HistoryError where two disagree.
-
-    entries, table : under creepkit's names.
-    """
-    result, assumptions = dict(entries), list[str]()
-    taken: dict[str, tuple[float, str]] = {}
-    for source in table.sources:
-        quantity, kind = source.key, known.conditions.kinds[source.key]
-        text, unit = source.text.replace(",", ".").split(" ", 1)
-        suffix = unit_suffix(unit) or unit
-        value = kind.convert(float(text), suffix, source.location, quantity)
-        other = taken.get(quantity) or _stated(quantity, result, table, known)
-        where = source.location.removeprefix(str(table.path)).lstrip(":, ")
-        if other is not None:
-            if abs(value - other[0]) <= _tolerance(quantity, other[0]):
-                continue
-            if f"{ANSWERS_FILE} [" not in other[1]:
-                what = f"states a {quantity} of {quoted(source.text, 20)}, but {other[1]}"
-                raise HistoryError(f"{source.location}: {what}; correct one of them")
-            assumptions.append(f"{quantity} of {ANSWERS_FILE} and not {source.text} from {where}".replace(", ", " "))
-            continue
-        if _is_stated_otherwise(quantity, result, table, known):
-            continue
-        taken[quantity] = (value, f"{source.location} states {source.text}")
-        result[f"{quantity}_{suffix}"] = SourceText(text, source.location, key=quantity)
-        assumptions.append(f"{quantity} {source.text} from {'line ' * where.isdigit()}{where}".replace(", ", " "))
-    return result, assumptions
-
-
-def _stated(
-    quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms
-) -> tuple[float, str] | None:
-    """What is stated or was recorded of a quantity, with where; None for what changes or is not there."""
-    kind = known.conditions.kinds[quantity]
-    for key, entry in entries.items():
-        found = split_unit(key, known.conditions.kinds)
-        if found and found[0] == quantity and found[1] in kind.units:
-            return kind.convert(
-                entry.number(key), found[1], entry.location, key
-            ), f"{entry.location} states {entry.text}"
-    for name in table.columns:
-        found = split_unit(name, known.columns.kinds)
-        if found and found[0] == quantity and found[1] in kind.units:
-            unit = kind.units[found[1]]
-            low, middle, high = unit.factor * np.percentile(table.numbers(name), (10, 50, 90)) + unit.offset
-            held = high - low <= max(_tolerance(quantity, float(middle)), 0.0)
-            where = table.location(table.columns_line)
-            return (float(middle), f"the column '{name}' of {where} holds {middle:g}") if held else None
-    return None
-
-
-_OF_AREA = ("area", "diameter", "width")
-"""What lengths of a cross-section begin with."""
-
-
-def _is_stated_otherwise(quantity: str, entries: Mapping[str, SourceText], table: CellTable, known: Terms) -> bool:
-    """Whether steps, programs, columns or another load leave nothing to state."""
-    names, terms = [*entries, *table.columns], known
-    if any(name == quantity or name.startswith(f"{quantity}_") for name in names):
-        return True
-    if quantity not in terms.load_kinds:
-        return False
-    others = [(split_unit(name, terms.load_kinds) or ("", ""), name in entries) for name in names]
-    if quantity == "stress" and not any(name.startswith(_OF_AREA) for name in entries):
-        others = [(found, is_entry) for found, is_entry in others if found[0] != "force"]  # is none without an area
-    forms = ("steps", "program", "1", *LENGTH.units)
-    return any(
-        load and (is_entry or load in terms.number_kinds) and (unit in forms or unit in terms.load_kinds[load].units)
-        for (load, unit), is_entry in others
-    )
-
-
-def _tolerance(quantity: str, value: float) -> float:
-    return TEMPERATURE_AGREEMENT if quantity == "temperature" else LOAD_AGREEMENT * abs(value)

@@ -7,7 +7,7 @@ test above whose columns it stands, else for all.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
@@ -16,14 +16,14 @@ from typing import NamedTuple
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
+from creepkit.readers.names import NAMES_OF
+from creepkit.readers.remarks import rows_beside_notes, without_remarks, without_remarks_around
 from creepkit.readers.table import (
     CellTable,
     SourceText,
     TableRow,
     cells_of,
-    cells_of_width,
     check_columns,
     grouped,
     named_columns,
@@ -34,23 +34,14 @@ from creepkit.readers.table import (
 from creepkit.readers.table_heads import (
     HeadedTable,
     HeadOfTest,
-    conditions_in_text,
-    conditions_of_head,
     headed_table,
     heads_of_tests,
     is_frame,
     is_time,
     test_and_column,
 )
-from creepkit.readers.vocabulary import (
-    NAMES_OF,
-    HeaderVocabulary,
-    Terms,
-    names_tests,
-    split_written_name,
-    unit_suffix,
-    words_of,
-)
+from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, split_written_name, unit_suffix, words_of
+from creepkit.readers.weak_sources import conditions_in_text, conditions_of_head
 from creepkit.records.quantities import STRAIN
 
 # ---- tests in rows ---------------------------------------------------------------------------------------------------
@@ -73,23 +64,6 @@ def refuse_twice(entries: dict[str, SourceText], header: Mapping[str, SourceText
     for key, entry in entries.items():
         if key in given:
             raise HistoryError(f"{entry.location}: '{key}' was already given; keep one of them")
-
-
-def without_remarks(table: CellTable, notes: dict[str, SourceText], labels: Collection[str] = ()) -> CellTable:
-    """The table without columns of remarks, whose texts are added to the notes by line.
-
-    labels : columns of words that are remarks where their cells differ.
-    """
-    cells = {k: set(cells_of(table.rows, k)) for k in range(len(table.columns))}
-    words = [k for k, one in cells.items() if len(one) > 1 and not any(is_number(cell, table.dialect) for cell in one)]
-    columns = [k for k in cells if kind_of_column(table.columns[k]) == "remark"]
-    columns += [k for k in words if table.columns[k] in labels and k not in columns]
-    if not columns:
-        return table
-    for row in table.rows:
-        if text := "; ".join(row.cells[k] for k in columns if row.cells[k]):
-            notes[f"label line {row.line}"] = SourceText(text, table.location(row.line))
-    return table.keeping([k for k in range(len(table.columns)) if k not in columns])
 
 
 _CLOCK = re.compile(r"^(\d{1,2})(?:[:h]|\.(?=.*uhr))(\d{2})(?: ?(?:uhr|h))?$", re.IGNORECASE)
@@ -292,7 +266,8 @@ def tests_in(table: CellTable, vocabulary: HeaderVocabulary) -> list[TabulatedTe
 
 
 _TITLE_OF_TEST = re.compile(
-    r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|bar)[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
+    r"(?:creep )?(?:test|specimen|sample|probe|versuch|essai|[ée]prouvette|provino|prova|probeta|ensayo|bar)"
+    r"[ -]?(?:piece|no|nr|n°|id|name)?[.: #=]*"
     r"(\S.*)",
     re.IGNORECASE,
 )
@@ -301,7 +276,7 @@ _TITLE_OF_TEST = re.compile(
 def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
     """The tables below one another that each begin with titles and names of columns; [] of a single one.
 
-    One whose head says nothing new and whose times go on is the same test on a new page.
+    One whose head says nothing new is the same test on a new page, or behind a pause.
     """
     starts, head, last, blocks = [0], -1, -1, list[list[TableRow]]()
     for k, row in enumerate(table.rows):
@@ -318,9 +293,7 @@ def _blocks(table: CellTable, known: Terms) -> list[CellTable]:
         body = next((k for k, row in enumerate(part) if is_frame(row, table)), len(part))
         said = {cell for row in blocks[-1] for cell in row.cells} if blocks else set()
         is_new = any(cell not in said for row in part[:body] for cell in row.cells)
-        around = [*(blocks[-1][-1:] if blocks else ()), *part[body : body + 1]]
-        times = [next((float_of(c) for c in row.cells if is_number(c, table.dialect)), 0.0) for row in around]
-        if is_new or len(times) < 2 or times[1] < times[0]:
+        if is_new:
             blocks.append(part)
         else:
             blocks[-1] += part[body:]
@@ -483,22 +456,6 @@ def _tests_of_blocks(
     return list(results.values())
 
 
-def rows_beside_notes(
-    table: CellTable, rows: Sequence[TableRow], used: Collection[int], notes: dict[str, SourceText]
-) -> Iterator[TableRow]:
-    """The rows, of as many cells as there are columns in use; texts beside them are added to the notes."""
-    width = max(used) + 1
-    for row in rows:
-        cells = cells_of_width(table, row, width, beside=True)
-        foreign = [cell for k, cell in enumerate(cells) if cell and k not in used]
-        if number := next((cell for cell in foreign if is_number(cell, table.dialect)), ""):
-            what = f"'{quoted(number)}' stands in a column without a name"
-            raise HistoryError(f"{table.location(row.line)}: {what}; name it or remove it")
-        if foreign:
-            notes[f"label beside line {row.line}"] = SourceText("; ".join(foreign), table.location(row.line))
-        yield TableRow(row.line, cells[:width])
-
-
 # ---- one test, or tests by rows ------------------------------------------------------------------------------------
 
 
@@ -515,66 +472,12 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
     for row in headed.whole:
         head.read(row)
     refuse_twice(head.entries, headed.table.header, headed.known)
-    table, footers = _without_remarks_around(headed.table, head.entries, headed.known)
+    table, footers = without_remarks_around(headed.table, head.entries, headed.known)
     table = with_one_clock(named_columns(table), headed.known)
     table = replace(table.assuming(*head.assumptions, *footers), sources=tuple(head.sources))
     table = without_remarks(table, head.entries, headed.known.vocabulary.labels)
     table = with_groups(with_names(table, headed.known), headed.known)
     return rows_by_test(table, {**table.header, **head.entries}, headed.known)
-
-
-def _without_remarks_around(
-    table: CellTable, notes: dict[str, SourceText], known: Terms
-) -> tuple[CellTable, list[str]]:
-    """The table without texts right of its named columns, which become notes, or remarks amid frames; and these."""
-    footers, frames = list[str](), list[TableRow]()
-    begins_with_text = [row.cells[0][:1].isalpha() and row.cells[0].lower() not in _LOST for row in table.rows]
-    is_numbered = any(is_number(row.cells[0], table.dialect) for row in table.rows[1:2])
-    last = next((k for k, is_text in reversed([*enumerate(begins_with_text)]) if not is_text), 0)
-    is_footer = [is_numbered and k > last for k in range(len(table.rows))]  # "Mean | 0.3"
-    for k, row in enumerate(table.rows):
-        after = [one for one in table.rows[k + 1 : k + 6] if not _is_remark(one, table)][:1]
-        is_remark = _is_remark(row, table) and not any(_begins_again(table.rows[k - 1], one, table) for one in after)
-        if k < 2 or not (is_remark or is_footer[k]):
-            frames.append(row)
-            continue
-        text = " ".join(filter(None, row.cells))
-        states = bool(conditions_in_text(text, "", known))
-        if states or end_said_by(text):
-            notes[f"label {'remark ' * (not states)}line {row.line}"] = SourceText(text, table.location(row.line))
-        footers.append(f"line {row.line} is a remark ({quoted(text)})".replace(",", ";"))
-    rows, width = list[TableRow](), max((k for k, cell in enumerate(table.rows[0].cells, 1) if cell), default=0)
-    for row in frames:
-        beside = [cell for cell in row.cells[width:] if cell]
-        if not beside or any(is_number(cell, table.dialect) for cell in beside):
-            rows.append(row)
-            continue
-        notes[f"label line {row.line}"] = SourceText("; ".join(beside), table.location(row.line))
-        if any(row.cells[:width]):
-            rows.append(TableRow(row.line, row.cells[:width]))
-    return replace(table, rows=rows), footers
-
-
-def _begins_again(before: TableRow, after: TableRow, table: CellTable) -> bool:
-    """Whether frames of another test follow a row of text: a number that falls, or what is neither it nor a clock."""
-    cells = before.cells[0], after.cells[0]
-    known = [float_of(cell) for cell in cells if is_number(cell, table.dialect)]
-    return known[1] < known[0] if known[1:] else not all(map(is_clock_time, cells))
-
-
-_LOST = {"nan", "inf", "na", "n/a", "-", "--", "none", "null", "-nan", "-inf"}
-
-
-def _is_remark(row: TableRow, table: CellTable) -> bool:
-    """Whether a row holds one cell of several words, none of them first a number, or `End`; `nan` is a lost number."""
-    cells = [cell for cell in row.cells if cell]
-    if table.dialect.delimiter == " ":
-        cells = [" ".join(cells)]
-    if len(cells) != 1 or not cells[0].lstrip("(*#- ")[:1].isalpha():
-        return False
-    words = cells[0].lower().strip(".:*-= ").split()
-    count = sum(word in _LOST for word in words)
-    return (len(words) > 1 + 3 * count and count < 2) or words in (["end"], ["eof"])
 
 
 LAYOUTS: Sequence[Layout] = (

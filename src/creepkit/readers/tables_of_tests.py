@@ -7,7 +7,7 @@ in merged cells, above blank ones, or in a row of its own.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
@@ -29,8 +29,18 @@ from creepkit.readers.columns_of_tests import (
     quantity_of,
     unit_in,
 )
-from creepkit.readers.ends_of_tests import LABEL, NO, TIME_IN_CELL, YES, kind_of_column, plain_words
-from creepkit.readers.questions import Question, collected
+from creepkit.readers.ends_of_tests import (
+    LABEL,
+    NO,
+    UNCLEAR,
+    YES,
+    end_said_by,
+    invalidity_said_by,
+    kind_of_column,
+    plain_words,
+)
+from creepkit.readers.questions import ANSWERS_FILE, Answer, Question, collected
+from creepkit.readers.remarks import rows_beside_notes, tests_named
 from creepkit.readers.table import (
     POINT_OF_THOUSANDS,
     CellTable,
@@ -39,19 +49,21 @@ from creepkit.readers.table import (
     with_commas_of_remarks,
     without_ignored,
 )
-from creepkit.readers.table_heads import HeadOfTest, conditions_in_text, sources_of_names, with_entries_of_comments
-from creepkit.readers.table_layouts import rows_beside_notes
-from creepkit.readers.tests_file import answers_of
+from creepkit.readers.table_heads import HeadOfTest, with_entries_of_comments
+from creepkit.readers.tests_file import EXCLUDE, answers_of
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
     HeaderVocabulary,
     Terms,
+    in_unit,
     plain_name,
     split_unit,
     split_written_name,
+    unit_behind,
     unit_suffix,
     words_of,
 )
+from creepkit.readers.weak_sources import conditions_in_text, sources_of_names
 from creepkit.records.quantities import RATE, STRESS, TIME
 
 MOST_ASKED = 6
@@ -118,9 +130,9 @@ class TestTable:
         self.is_understood = len(errors) == count
         if self.is_understood:
             self._fill_stated()
+            self._take_answers()
+            self._leave_out_silent_rows()
             self._fill_groups()
-            if vocabulary.ignored:
-                self._leave_out_silent_rows()
 
     @property
     def place(self) -> str:
@@ -141,14 +153,34 @@ class TestTable:
         k = self.position("name")
         return ["" if k is None else row.cells[k] for row in self.rows]
 
+    def name_of(self, row: TestRow) -> str:
+        """The name of its test: that of its cell, else the sheet or the file and the line."""
+        k = self.position("name")
+        return (k is not None and row.cells[k]) or f"{self.table.sheet or self.table.path.stem} {row.line}"
+
+    def notes_of_rows(self) -> list[dict[str, SourceText]]:
+        """The notes of each row as labels: those that name tests, or say that one does not count, are not of all."""
+        names, found = [self.name_of(row) for row in self.rows], [dict[str, SourceText]() for _ in self.rows]
+        for key, entry in self._footnotes.items():
+            of = entry.text.rpartition(" (of ")[2].rstrip(")").split("; ")
+            rows = {k for k, row in enumerate(self.rows) if {*of} & {*row.cells}}
+            for k in rows or range(len(self.rows)):
+                found[k][key] = entry
+        sentences = (one for note in self.notes for one in re.split(r"(?<=[.;]) (?=[^\W\d_])", note))
+        for number, note in enumerate(sentences):
+            rows, sign = tests_named(note, names), re.match(r"\W{1,3}(?=\s|$)", note)
+            if not rows and invalidity_said_by(note):
+                cells = [row.cells for row in self.rows] if sign else []
+                rows = {k for k, row in enumerate(cells) if sign and any(c.endswith(sign[0].strip()) for c in row)}
+            elif not rows:
+                rows = set(range(len(self.rows)))
+            for k in rows:
+                found[k][f"label note {number + 1}"] = SourceText(note, self.place)
+        return found
+
     def entry(self, row: TestRow, k: int) -> SourceText:
         """A cell of a row; of a number without separators between thousands, with a decimal point."""
         text, decimal = row.cells[k], self.table.dialect.decimal
-        if self.columns[k].kind is TIME and (match := TIME_IN_CELL.fullmatch(text)) and match["after"]:
-            unit = unit_suffix(match["after"].split(" ")[0].rstrip(".,;()"))
-            if unit in TIME.units and unit != self.columns[k].unit:
-                what = f"'{quoted(self.names[k], 60)}' is in {self.columns[k].unit}, and '{quoted(text)}' in {unit}"
-                raise HistoryError(f"{self.table.location(row.line)}: {what}; write it in {self.columns[k].unit}")
         if self.columns[k].kind or re.fullmatch(r"[+-]?\d*,\d+", text):
             text, decimal = plain_number(text, decimal)
         if self.columns[k].factor != 1.0 and is_number(text, Dialect(decimal=decimal)):
@@ -174,8 +206,8 @@ class TestTable:
                 cell for row in statistics for cell in row.cells if _STATISTIC.fullmatch(words_of(cell))
             )
             sheet = sheet.assuming(f"rows of {called} are no tests")
-        while body and _is_note(body[-1], dialect):
-            self.notes.append(" ".join(dict.fromkeys(filter(None, body.pop().cells))))
+        while body and _is_note(body[-1], dialect, len(names)):
+            self.notes.append(re.sub("([:：]);", r"\1", "; ".join(dict.fromkeys(filter(None, body.pop().cells)))))
         named = [k for k, name in enumerate(names) if name]
         stated, beside = dict[str, SourceText](), dict[str, SourceText]()
         for row in body:
@@ -192,7 +224,9 @@ class TestTable:
         columns = [*(names[k] for k in named), *["note"] * bool(beside)]
         positions = [below.positions[k] if below.positions else k for k in named] + [named[-1] + 1] * bool(beside)
         sources = [*around.sources, *sources_of_names(sheet, self.vocabulary)]
-        self.table = replace(sheet, rows=(), columns=columns, columns_line=line, header=around.entries)
+        self._footnotes = {key: one for key, one in around.entries.items() if key.startswith("label footnote ")}
+        header = {key: one for key, one in around.entries.items() if key not in self._footnotes}
+        self.table = replace(sheet, rows=(), columns=columns, columns_line=line, header=header)
         self.table = replace(self.table, positions=positions, sources=tuple(sources))
 
     def _around(self, sheet: CellTable, above: Sequence[TableRow], known: Terms) -> HeadOfTest:
@@ -203,7 +237,7 @@ class TestTable:
         for key in [key for key in head.entries if key.startswith("label ") and key not in {*sheet.header, *TEXTS}]:
             entry = head.entries.pop(key)
             self.notes.append(entry.text if key.startswith("label line ") else f"{key[6:]} {entry.text}")
-        self.notes += [f"{key}: {entry.text}" for _, key, entry in sheet.comments]
+        self.notes += [f"{key}: {entry.text}" if key else entry.text for _, key, entry in sheet.comments]
         return head
 
     # ---- columns
@@ -221,7 +255,9 @@ class TestTable:
             if column.kind is TIME:
                 collected(self.errors, partial(self._ask_of_points, written, cells))
             if kind := column.kind:
-                column = replace(column, unit=column.unit or _unit_of_cells(cells))
+                units = (unit_behind(cell, kind) for cell in cells)
+                column = replace(column, unit=column.unit or next(filter(None, units), ""))
+                collected(self.errors, partial(self._convert_cells, k, column, written))
                 if kind is TIME and not column.unit and (unit := unit_in(" | ".join(self.notes), TIME, "(?:in|en) ")):
                     self.table = self.table.assuming(f"'{quoted(written, 60)}' in {unit} by the title")
                     column = replace(column, unit=unit)
@@ -251,6 +287,27 @@ class TestTable:
                     self.errors.append(HistoryError(f"{self.table.header[key].location}: {what}"))
             found.append(column)
             yield column
+
+    def _convert_cells(self, k: int, column: TestColumn, written: str) -> None:
+        """Convert cells with another unit than that of their column, `3 days` beside `1020 h`.
+
+        Question where other cells have none, and the name of the column neither.
+        """
+        kind, sign = column.kind, self.table.dialect.decimal
+        assert kind is not None
+        bare = [row for row in self.rows if re.search(r"\d", row.cells[k]) and not unit_behind(row.cells[k], kind)]
+        is_unsaid = self.vocabulary.synonyms.get(written, written) == written and not column_called(written).unit
+        if is_unsaid and bare and len(bare) < len(self.rows) and column.unit:
+            what = (
+                f"'{quoted(written, 60)}' is '{quoted(bare[0].cells[k], 40)}' without the unit of others; which is it?"
+            )
+            choice: Answer = {written: f"{column.quantity.replace(' ', '_')}_{column.unit}"}
+            raise self.table.question(what, "columns", choice, line=bare[0].line, is_free=True)
+        for row in self.rows:
+            cell = row.cells[k]
+            if unit_behind(cell, kind) not in ("", column.unit) and (text := in_unit(cell, kind, column.unit, sign)):
+                row.cells[k] = text
+                row.assumed.append(f"{cell} is {text} {column.unit}".replace(",", "."))
 
     def _tells_tests_apart(self, k: int, column: TestColumn, cells: Sequence[str]) -> bool:
         """Whether a column of specimens, or a first one of words, holds the names of the tests, and no other does.
@@ -387,23 +444,72 @@ class TestTable:
         line = self.rows[missing[0]].line
         return self.table.question(what, f"{quantity}_{unit}", number, line=line, is_free=True)
 
+    def _take_answers(self) -> None:
+        """Take what a file of answers states of single tests, in the place of cells; leave out those it excludes."""
+        of_tests, excluded = self.vocabulary.of_tests, dict[str, str]()
+        for row in self.rows:
+            for key, (text, place) in of_tests.get(self.name_of(row), {}).items():
+                quantity, unit = split_unit(key, {**CONDITION_KINDS, **NAMES.kinds}) or (key, "")
+                k = self.position(quantity)
+                if key == EXCLUDE:
+                    excluded[self.name_of(row)] = text
+                elif k is not None and self.columns[k].unit == unit:
+                    row.cells[k] = text
+                    row.assumed.append(f"{key} {text} of {ANSWERS_FILE}")
+                elif k is not None:
+                    what = f"'{key}' takes the place of a cell of '{quoted(self.names[k], 60)}'; state it in that unit"
+                    self.errors.append(HistoryError(f"{place}: {what}"))
+                else:
+                    row.stated = {**row.stated, key: SourceText(text, place)}
+        self._leave_out(
+            [row for row in self.rows if self.name_of(row) in excluded], lambda row: excluded[self.name_of(row)]
+        )
+
+    def _leave_out(self, rows: Sequence[TestRow], reason: Callable[[TestRow], str]) -> None:
+        """Leave out rows; the assumptions name them with their reasons."""
+        by_reason = dict[str, list[str]]()
+        for row in rows:
+            by_reason.setdefault(reason(row), []).append(self.name_of(row))
+        for why, names in by_reason.items():
+            more = f" and {len(names) - MOST_ASKED} more" if len(names) > MOST_ASKED else ""
+            listed = f"{' '.join(names[:MOST_ASKED])}{more}"
+            self.table = self.table.assuming(f"without {listed} ({why})".replace(",", ";"))
+        self.rows = [row for row in self.rows if all(row is not one for one in rows)]
+
     def _leave_out_silent_rows(self) -> None:
-        """Leave out rows that state no result once columns are left out, which its assumptions name."""
+        """Leave out rows with a word in the place of a stress or of all results, such as `n.d.`, that tells no end.
+
+        Rows of a table of which most are so are left for their errors.
+        """
         results = ("minimum_rate", "rupture", "end_time")
+        of_tests = [k for k, one in enumerate(self.columns) if one.quantity in ("stress", "temperature")]
         says = [k for k, one in enumerate(self.columns) if one.quantity in results or one.strain is not None]
-        silent = [all(is_missing(row.cells[k]) for k in says) for row in self.rows]
-        if silent and all(silent):
+        silent = list[TestRow]()
+        for row in self.rows:
+            words = [row.cells[k] for k in says if not is_missing(row.cells[k])]
+            is_told = any(re.search(r"\d", word) or end_said_by(word) not in ("", UNCLEAR) for word in words)
+            is_lost = any(_is_word(row.cells[k]) for k in of_tests)
+            is_empty = not any(_is_word(row.cells[k]) for k in says)
+            silent += [row] * (is_lost or not (is_told or (is_empty and not self.vocabulary.ignored)))
+        if self.vocabulary.ignored and self.rows and len(silent) == len(self.rows):
             raise HistoryError(
                 f"{self.place}: no row states a minimum creep rate or an end of its test once the ignored columns are "
                 "left out; keep one of these columns"
             )
-        names = zip(self.names_of_tests(), self.rows, silent, strict=True)
-        called = [name or f"line {row.line}" for name, row, is_silent in names if is_silent]
-        if called:
-            more = f" and {len(called) - MOST_ASKED} more" if len(called) > MOST_ASKED else ""
-            listed = f"{' '.join(called[:MOST_ASKED])}{more}"
-            self.table = self.table.assuming(f"without {listed} (nothing but ignored columns)")
-            self.rows = [row for row, is_silent in zip(self.rows, silent, strict=True) if not is_silent]
+        if self.vocabulary.ignored or 2 * len(silent) < len(self.rows):
+            self._leave_out(silent, lambda row: self._words_of(row, [*of_tests, *says]))
+
+    def _words_of(self, row: TestRow, columns: Sequence[int]) -> str:
+        """What stands in a row in the place of numbers."""
+        found = [
+            f"'{quoted(row.cells[k], 40)}' in '{quoted(self.names[k], 40)}'" for k in columns if _is_word(row.cells[k])
+        ]
+        return " and ".join(found) or ("nothing but ignored columns" if self.vocabulary.ignored else "no result")
+
+
+def _is_word(cell: str) -> bool:
+    """Whether a cell holds text in the place of a number, marks of lost values included; dashes are none."""
+    return re.search(r"[^\W\d_]", cell) is not None and not re.search(r"\d", cell) and cell.casefold() not in _DITTO
 
 
 _OF_TREATMENT = re.compile(
@@ -424,15 +530,8 @@ def _is_statistic(row: TableRow, dialect: Dialect) -> bool:
     return len(texts) == 1 and _STATISTIC.fullmatch(words_of(texts[0])) is not None
 
 
-def _is_note(row: TableRow, dialect: Dialect) -> bool:
+def _is_note(row: TableRow, dialect: Dialect, width: int) -> bool:
     """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
     filled = [cell for cell in row.cells if cell]
-    few = len(filled) <= 2 < len(row.cells) and not any(is_number_like(cell, dialect) for cell in filled)
+    few = len(filled) <= 2 < width and not any(is_number_like(cell, dialect) for cell in filled)
     return few or bool(only_text(row, dialect))
-
-
-def _unit_of_cells(cells: Sequence[str]) -> str:
-    """The unit behind the numbers of a column, as in `600 °C`; "" where not all cells that hold something have it."""
-    texts = [cell for cell in cells if not is_missing(cell)]
-    found = {unit_suffix(re.sub(r"^[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*", "", text)) or "" for text in texts}
-    return found.pop() if len(found) == 1 else ""

@@ -8,10 +8,13 @@
     ["rates.csv"]
     ended = {abgestellt = "stopped", K013 = "ruptured"}
 
+    ["rates.csv".tests.C3]
+    exclude = "the grip slipped"
+
 A table holds for the files that its pattern matches, later ones over earlier ones. Its keys are conditions as they
 stand in the head of a file; `columns`, {name as written: what it is}; `ended`, a word for all tests, or {text, code or
 name of a test: ruptured, stopped or label}; `parts`, whether files that are parts of a test are joined or separate;
-`decimal`, point or comma.
+`decimal`, point or comma; `tests`, {name: conditions of that test alone, or why it is left out, `exclude`}.
 """
 
 from __future__ import annotations
@@ -42,6 +45,10 @@ DECIMAL_SIGNS: Mapping[str, str] = {".": ".", ",": ",", "point": ".", "comma": "
 """What `decimal` may say, here or in the head of a file."""
 
 
+EXCLUDE = "exclude"
+"""The key that says why a test is left out."""
+
+
 JOINED, SEPARATE = "joined", "separate"
 """What `parts` may say of files that are parts of one test."""
 
@@ -50,7 +57,7 @@ class Answers(NamedTuple):
     """What tests.toml says of one file.
 
     stated : {condition: text and place}. columns : {name as written: what it is}. ended : {text: end}. parts : whether
-    parts of a test are joined. decimal : the sign in numbers.
+    parts of a test are joined. decimal : the sign in numbers. tests : {name: what is stated of that test alone}.
     """
 
     stated: dict[str, tuple[str, str]]
@@ -58,6 +65,7 @@ class Answers(NamedTuple):
     ended: dict[str, str]
     parts: str = ""
     decimal: str = ""
+    tests: Mapping[str, Mapping[str, tuple[str, str]]] = {}
 
     def added_to(self, vocabulary: HeaderVocabulary) -> HeaderVocabulary:
         """The vocabulary of a reader with the answers."""
@@ -77,6 +85,7 @@ class Answers(NamedTuple):
             ignored=kept[UNUSED],
             end_of_test_terms={**vocabulary.end_of_test_terms, **self.ended},
             stated={**vocabulary.stated, **self.stated},
+            of_tests={**vocabulary.of_tests, **self.tests},
         )
 
 
@@ -96,10 +105,17 @@ def answers_of(path: Path) -> Answers:
                     found = found._replace(decimal=DECIMAL_SIGNS[value])
                 elif key == "ended" and isinstance(value, dict):
                     found.ended.update({text.casefold(): end for text, end in value.items()})
+                elif key == "tests":
+                    of_tests = {name: _texts(one, f'{file} ["{pattern}".tests.{name}]') for name, one in value.items()}
+                    found = found._replace(tests={**found.tests, **of_tests})
                 else:
-                    text = value if isinstance(value, str) else repr(value)
-                    found.stated[key] = (text, f'{file} ["{pattern}"]')
+                    found.stated.update(_texts({key: value}, f'{file} ["{pattern}"]'))
     return found
+
+
+def _texts(table: Mapping[str, Any], place: str) -> dict[str, tuple[str, str]]:
+    """{key: its value as a text, and its place}."""
+    return {key: (value if isinstance(value, str) else repr(value), place) for key, value in table.items()}
 
 
 def read_answers(file: Path) -> dict[str, dict[str, Any]]:
@@ -139,10 +155,16 @@ def _problem(key: str, value: Any, known: Terms) -> str:
         values = list(value.values()) if isinstance(value, dict) else [value]
         wrong = [one for one in values if one not in (_ENDS if isinstance(value, dict) else _ENDS[:2])]
         return f"'{quoted(wrong[0])}' is no end; allowed: {', '.join(_ENDS)}" if wrong else ""
+    if key == "tests":
+        tables = [*value.values()] if isinstance(value, dict) else []
+        if not tables or not all(isinstance(one, dict) for one in tables):
+            return 'write a table a test, such as ["a.csv".tests.C3] and exclude = "its grip slipped" below it'
+        found = ((one, _problem(one, what, known)) for table in tables for one, what in table.items())
+        return next((f"{one} {what}" for one, what in found if what and one != EXCLUDE), "")
     if known.is_condition(key):
         is_single = isinstance(value, (str, int, float)) and not isinstance(value, bool)
         return "" if is_single else "write a number or a text"
-    near = get_close_matches(key, ["columns", "ended", "parts"], 1)
+    near = get_close_matches(key, ["columns", "ended", "parts", "tests"], 1)
     meant = near[0] if near else known.suggestion(key)
-    allowed = "allowed are columns, ended, parts, and conditions as in the head of a file, such as stress_MPa"
+    allowed = "allowed are columns, ended, parts, tests, and conditions as in the head of a file, such as stress_MPa"
     return f"is no key; did you mean '{meant}'?" if meant else f"is no key; {allowed}"

@@ -8,7 +8,7 @@ How a test ended is read of marks of its time (`>10000`, `10000+`), of columns o
 remarks; what stays open is asked for (`ends_of_tests`). Times to a strain become frames of strain. Other columns are
 labels. All errors of a file come at once.
 
-Rupture times may stand in a matrix, temperatures by stresses:
+Rupture times may stand in a matrix, temperatures by stresses or the other way round:
 
     Time to rupture (h), heat AAA
     Temperature (°C) / Stress (MPa), 235, 196, 177
@@ -64,10 +64,10 @@ from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
 from creepkit.readers.table import CellTable, SourceText, TableRow
-from creepkit.readers.table_heads import with_weak_sources
 from creepkit.readers.tables_of_tests import MOST_ASKED, TestRow, TestTable
 from creepkit.readers.text_files import peek_table, read_text_table
 from creepkit.readers.vocabulary import HeaderVocabulary, split_written_name, unit_suffix, words_of
+from creepkit.readers.weak_sources import with_weak_sources
 from creepkit.records import History
 from creepkit.records.quantities import STRESS, TEMPERATURE, TIME, QuantityKind
 
@@ -116,7 +116,8 @@ class RowPerTestReader:
         for table in self.tables(path, errors):
             if not table.is_understood:
                 continue
-            for row, end in zip(table.rows, ends_of_rows(table), strict=True):
+            for row, end, notes in zip(table.rows, ends_of_rows(table), table.notes_of_rows(), strict=True):
+                row.stated = {**notes, **row.stated}
                 if (end.is_open or row.is_open) and errors:
                     continue
                 history = collected(errors, partial(self._history, table, row, end))
@@ -178,7 +179,7 @@ class RowPerTestReader:
         ]
         if assumed := ", ".join(filter(None, assumptions)):
             entries.setdefault("label assumed", SourceText(assumed, location))
-        name, where = f"{sheet.sheet or sheet.path.stem} {row.line}", f"sheet {sheet.sheet}, " if sheet.sheet else ""
+        name, where = table.name_of(row), f"sheet {sheet.sheet}, " if sheet.sheet else ""
         source = f"{sheet.path} ({where}{cells['name'].entry.text if 'name' in cells else f'line {row.line}'})"
         if not frames:
             return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
@@ -460,7 +461,7 @@ def _check_duration(rupture: Cell, duration: Cell | None) -> None:
 # ---- a matrix of rupture times -------------------------------------------------------------------------------------
 
 
-_OF_RUPTURE = re.compile(r"rupture|zeitstand|bruchzeit|standzeit|time to failure", re.IGNORECASE)
+_OF_RUPTURE = re.compile(r"rupture|zeitstand|bruchzeit|standzeit|time to failure|rott?ura", re.IGNORECASE)
 _HEAT = re.compile(
     r"(?i:heat|cast|charge|schmelze|coulée|batch)(?: no\.?)?[ _:=#-]*((?=[A-Z\d])(?!Treat)[\w-]+?)(?:_|\b)"
 )
@@ -474,8 +475,9 @@ def one_row_a_test(table: CellTable) -> CellTable:
     rows, dialect = table.rows, table.dialect
     for at, row in enumerate(rows[:_SEARCHED]):
         above = [cell for one in rows[max(0, at - _DEEPEST) : at] for cell in one.cells if cell]
-        is_named = not is_number_like(row.cells[0], dialect)  # the row of stresses; a test begins with a temperature
-        if is_named and len(_axis(row.cells[1:], STRESS)[0]) > 1 and at + 1 < len(rows):
+        is_named = not is_number_like(row.cells[0], dialect)  # the row of an axis; a test begins with a number
+        is_axis = any(len(_axis(row.cells[1:], kind)[0]) > 1 for kind in _AXES.values())
+        if is_named and is_axis and at + 1 < len(rows):
             said = [*above, row.cells[0], table.sheet, table.path.stem]
             first = [one.cells[0] for one in rows[max(0, at - _DEEPEST) : at + 1] if one.cells[0]]
             if any(map(_OF_RUPTURE.search, said)) and not any(map(RATES.search, map(str.casefold, said))):
@@ -483,40 +485,59 @@ def one_row_a_test(table: CellTable) -> CellTable:
     return table
 
 
-def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[str]) -> CellTable | None:
-    """The rows of tests of a matrix whose stresses stand in a row; None where the rows below are no temperatures.
+_AXES: Mapping[str, QuantityKind] = {"stress": STRESS, "temperature": TEMPERATURE}
+"""{quantity of an axis of a matrix: its kind}."""
 
-    said : texts of its head. first : those of its first column.
+
+def _named_axes(texts: Iterable[str]) -> list[TestColumn]:
+    """The axes that texts such as `Temperature (°C) / Stress (MPa)` name."""
+    columns = (column_called(part) for text in texts for part in re.split(r"\s+[\\/|]\s+|\\", text))
+    return [one for one in columns if one.quantity in _AXES]
+
+
+def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[str]) -> CellTable | None:
+    """The rows of tests of a matrix, of which units or the name nearest to its corner say what stands down the rows.
+
+    None where they do not. said : texts of its head. first : those of its first column.
     """
     dialect = table.dialect
-    stresses, loads = _axis(table.rows[at].cells[1:], STRESS)
-    corners = [part for text in reversed(first) for part in re.split(r"\s+[\\/|]\s+|\\", text)]
-    columns = [column_called(part) for part in corners]
-    unit = next((one.unit for one in columns if one.quantity == "temperature"), None)
     body = [row for row in table.rows[at + 1 :] if not only_text(row, dialect)]
-    temperatures, degrees = _axis([row.cells[0] for row in body], TEMPERATURE)
-    is_stress = loads or any(re.search(r"stress|spannung|contrainte|σ|MPa", text) for text in said)
-    is_whole = "" not in temperatures and len(temperatures) == len(body)
-    if not (is_stress and is_whole) or (unit is None and not degrees):
+    cells = table.rows[at].cells[1:], [row.cells[0] for row in body]
+    by_unit = [next((name for name, kind in _AXES.items() if _axis(one, kind)[1]), "") for one in cells]
+    named = [one.quantity for one in _named_axes(reversed(first))]
+    down = by_unit[1] or next((name for name in _AXES if by_unit[0] not in ("", name)), "") or "".join(named[:1])
+    across = next((name for name in _AXES if name != down), "")
+    if not down or by_unit[0] not in ("", across):
+        return None
+    (values, unit), (levels, units) = (_axis(one, _AXES[name]) for one, name in zip(cells, (across, down), strict=True))
+    of_axis = {across: unit, down: units}
+    for one in _named_axes(reversed(said)):
+        of_axis[one.quantity] = of_axis[one.quantity] or one.unit
+    is_stress = of_axis["stress"] or any(
+        re.search(r"stress|spannung|contrainte|sforzo|tensi[oó]n|esfuerzo|σ|MPa", text) for text in said
+    )
+    is_whole = "" not in levels and len(levels) == len(body)
+    if not (is_stress and is_whole and of_axis["temperature"]):
         return None
     of_rupture = [text for text in said if _OF_RUPTURE.search(text)]
     times, loads = (
         known or next(filter(None, (unit_in(text, kind) for text in texts)), "")
-        for known, texts, kind in (("", of_rupture, TIME), (loads, said, STRESS))
+        for known, texts, kind in (("", of_rupture, TIME), (of_axis["stress"], said, STRESS))
     )
     heat = next((found[1] for text in said if (found := _HEAT.search(text)) and found[1]), "")
-    names = [("Temperature", degrees or unit), ("Stress", loads), ("Rupture time", times)]
+    names = [("Temperature", of_axis["temperature"]), ("Stress", loads), ("Rupture time", times)]
     head = ["Test", *(f"{name} ({unit})" if unit else name for name, unit in names), *["Heat"] * bool(heat)]
     notes = [row for row in table.rows if only_text(row, dialect) and row.line > table.rows[at].line]
     texts = [only_text(row, dialect).replace("( )", "()") for row in notes]
     legend = {sign: end for text in texts for sign, end in legend_in(text).items()}
     tests, count = list[TableRow](), Counter[str]()
-    for row, temperature in zip(body, temperatures, strict=True):
-        for stress, cell in zip(stresses, row.cells[1:], strict=False):
+    for row, level in zip(body, levels, strict=True):
+        for value, cell in zip(values, row.cells[1:], strict=False):
             if is_missing(cell) or cell in ("\N{MINUS SIGN}", "...", "…"):
                 continue
-            if not stress or not is_number_like(cell, dialect):
+            if not value or not is_number_like(cell, dialect):
                 return None
+            temperature, stress = (level, value) if down == "temperature" else (value, level)
             if cell[0] in "([" and legend.get("()") != RUPTURED:
                 cell = f">{cell.strip('()[] ')}"
             name = f"{heat or table.sheet or table.path.stem} {temperature} {stress}"
@@ -524,6 +545,7 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
             name = f"{name} ({count[name]})" if count[name] > 1 else name
             tests.append(TableRow(row.line, [name, temperature, stress, cell, *[heat] * bool(heat)]))
     titles = [row for row in table.rows[:at] if only_text(row, dialect) and row.cells[0]]
+    titles = [row for row in titles if not column_called(row.cells[0]).quantity]  # "Rupture time (h)"
     whole = [*titles, TableRow(table.rows[at].line, head), *tests, *notes]
     return replace(table, rows=whole, merged=frozenset()).assuming("a test a cell of a matrix of rupture times")
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from difflib import SequenceMatcher, get_close_matches
 from functools import cached_property, lru_cache
 
+from creepkit.readers.names import NAME_SYNONYMS, NAMES_OF, SYMBOLS
 from creepkit.records import TENSOR_COMPONENTS, dimensions_of, known_specimens, loads_of, outputs_of
 from creepkit.records.quantities import (
     AREA,
@@ -22,6 +23,7 @@ from creepkit.records.quantities import (
     RATE,
     SIGNED_STRESS,
     STRAIN,
+    STRESS,
     TEMPERATURE,
     TIME,
     QuantityKind,
@@ -44,172 +46,6 @@ def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] 
 
 UNIT_SPELLINGS: Mapping[str, str] = {spelling.lower(): symbol for spelling, symbol in spellings(*UNITS).items()}
 """{spelling in small letters: creepkit's suffix}. Capitals do not matter but where they tell units apart."""
-
-
-NAMES_OF: Mapping[str, tuple[str, ...]] = {
-    "time": (
-        *("timestamp", "time stamp", "datetime", "date time", "date/time", "date and time", "clock", "zeit", "elapsed"),
-        *("elapsed time", "unix", "unix time", "epoch", "epoch time", "uhrzeit", "zeitstempel", "test time", "時間"),
-        *("time of day", "time elapsed", "creep time", "time under load", "prüfzeit", "laufzeit", "belastungszeit"),
-        *("datum und uhrzeit", "datum uhrzeit", "datum/uhrzeit", "datum zeit", "date et heure", "date heure"),
-        *("beanspruchungsdauer", "versuchszeit", "temps", "durée", "temps écoulé", "x_value"),
-    ),
-    "date": ("date", "datum", "day", "tag", "jour"),
-    "temperature": (
-        *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
-        *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
-        *("probentemperatur", "ofen", "ofentemperatur", "temperatur ofen", "température", "température d'essai"),
-        *("four", "temp ctrl", "試験温度", "温度", "temp d'essai", "prüftemp", "versuchstemp", "probentemp", "nt11"),
-    ),
-    "stress": (
-        *("applied stress", "nominal stress", "initial stress", "creep stress", "test stress", "engineering stress"),
-        *("remaining stress", "residual stress", "relaxed stress", "restspannung", "spannung", "prüfspannung"),
-        *("nennspannung", "anfangsspannung", "contrainte", "contrainte initiale", "contrainte appliquée", "応力"),
-        *("contrainte nominale", "tensile stress", "axial stress", "s mises", "mises stress", "von mises stress"),
-    ),
-    "pressure": ("druck", "prüfdruck", "innendruck", "pression"),
-    "strain": (
-        *("creep", "total creep", "total creep strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
-        *("zeitdehnung", "déformation", "allongement relatif", "deformation relative", "tensile strain extensometer"),
-    ),
-    "diametral_strain": (
-        *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
-        *("tangentialdehnung", "déformation diamétrale", "déformation circonférentielle"),
-    ),
-    "diameter_growth": ("diameter change", "change of diameter", "diameter increase", "durchmesseränderung"),
-    "loading_strain": ("anfangsdehnung",),
-    "force": (
-        *("load", "applied load", "axial load", "axial force", "tensile load", "tensile force", "load cell", "kraft"),
-        *("prüfkraft", "standardkraft", "last", "zugkraft", "effort", "force axiale"),
-    ),
-    "elongation": (
-        *("extension", "extn", "ext", "creep extension", "extensometer", "gauge extension", "axial extension"),
-        *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
-        *("längenänderung", "verlängerung", "allongement", "height change", "change in height", "shortening"),
-        *("stauchung", "höhenänderung", "raccourcissement", "variation de hauteur"),
-    ),
-    "modulus": (
-        *("young's modulus", "youngs modulus", "elastic modulus", "modulus of elasticity", "e modulus", "e modul"),
-        *("elastizitätsmodul", "module d'young", "module d'élasticité"),
-    ),
-    "thermal_expansion": ("coefficient of thermal expansion", "cte", "wärmeausdehnungskoeffizient"),
-    "poisson": ("poisson's ratio", "poissons ratio", "poisson ratio"),
-    "rupture": (
-        *("rupture time", "time to rupture", "rupture life", "creep life", "t rupture", "ttr", "ttf", "bruchzeit"),
-        *("standzeit", "temps à rupture", "durée de vie"),
-    ),
-    "end_time": (
-        *("end time", "duration", "test duration", "time on test", "hours on test", "prüfdauer", "versuchsdauer"),
-        *("durée d'essai", "temps d'essai", "durée de l'essai"),
-    ),
-    "minimum_rate": ("minimum rate", "minimum creep rate", "mcr", "minimale kriechrate"),
-    "minimum_rate_sd": ("minimum rate sd", "min rate sd", "minimum creep rate sd", "min creep rate sd"),
-    "strain_sd": ("standard deviation of strain", "strain standard deviation"),
-    "diameter": (
-        *("specimen diameter", "sample diameter", "initial diameter", "gauge diameter", "durchmesser"),
-        *("probendurchmesser", "anfangsdurchmesser", "diamètre", "diamètre initial", "mean diameter", "dia", "diam"),
-        *("average diameter", "measured diameter", "mittlerer durchmesser", "diamètre moyen"),
-    ),
-    "gauge_length": (
-        *("gage length", "initial gauge length", "original gauge length", "reference length", "messlänge"),
-        *("anfangsmesslänge", "anfangsmesslänge le", "anfangsmesslänge l0", "messbasis", "longueur utile"),
-        *("longueur de base", "longueur de référence", "longueur entre repères"),
-    ),
-    "height": (
-        *("specimen height", "sample height", "initial height", "original height", "höhe", "probenhöhe", "hauteur"),
-        *("anfangshöhe", "ausgangshöhe", "hauteur initiale", "hauteur éprouvette"),
-    ),
-    "outer_diameter": (
-        *("od", "o.d.", "outside diameter", "tube diameter", "mean od", "mean outer diameter", "aussendurchmesser"),
-        *("außendurchmesser", "diamètre extérieur"),
-    ),
-    "deflection": (
-        *("midspan deflection", "deflection at midspan", "centre deflection", "center deflection", "durchbiegung"),
-        *("central deflection", "mid span deflection", "durchbiegung mitte", "mittendurchbiegung", "flèche"),
-        *("flèche au centre", "load point deflection", "load point displacement", "deflection at load points"),
-        *("apex height", "apex deflection", "dome height", "bulge height", "pole height", "kuppelhöhe", "wölbhöhe"),
-    ),
-    "notch_diameter": ("minimum diameter", "root diameter", "notch root diameter", "kerbdurchmesser"),
-    "span": (
-        *("outer span", "support span", "outer support span", "lower span", "outer roller spacing", "support distance"),
-        *("distance between supports", "auflagerabstand", "stützweite", "äußere stützweite", "portée"),
-        *("distance entre appuis",),
-    ),
-    "inner_span": (
-        *("inner span", "load span", "loading span", "inner loading span", "inner support span", "upper span"),
-        *("inner roller spacing", "innere stützweite", "laststützweite", "lastabstand", "portée intérieure"),
-    ),
-    "width": ("specimen width", "breite", "probenbreite", "largeur"),
-    "thickness": (
-        *("specimen thickness", "wall thickness", "wall", "dicke", "blechdicke", "probendicke", "wandstärke"),
-        *("wanddicke", "épaisseur", "épaisseur de paroi"),
-    ),
-    "area": (
-        *("cross section", "cross-section", "cross-sectional area", "cross section area", "initial area"),
-        *("querschnitt", "querschnittsfläche", "anfangsquerschnitt", "section", "section initiale"),
-    ),
-    "specimen": (
-        *("specimen type", "specimen form", "specimen shape", "specimen geometry", "type of specimen", "probenform"),
-        *("probentyp", "probengeometrie", "type d'éprouvette", "forme d'éprouvette"),
-    ),
-    "alloy": ("material", "werkstoff", "matériau", "alliage", "legierung", "composition", "nuance", "steel", "grade"),
-    "name": ("test name", "test id", "test", "試験片番号"),
-    "label heat": (
-        *("heat", "cast", "batch", "charge", "schmelze", "heat number", "heat no", "heat id", "coulée"),
-        "reference code",
-    ),
-    "label laboratory": ("laboratory", "lab", "labor", "laboratoire"),
-    "label operator": ("prüfer", "tester"),
-    "label elongation_pct": (
-        *("rupture elongation", "elongation at rupture", "bruchdehnung", "bruchdehnung a", "zeitbruchdehnung"),
-        *("allongement à rupture",),
-    ),
-    "label reduction_of_area_pct": (
-        *("reduction of area", "area reduction", "reduction in area", "brucheinschnürung", "einschnürung", "striction"),
-        *("striction à rupture",),
-    ),
-}
-"""{quantity, key of a text or of a label: its names in small letters}; a forecast tells the scatter between heats and
-laboratories apart."""
-
-
-_TRUE = (
-    *("true strain", "logarithmic strain", "true creep strain", "hencky strain", "wahre dehnung", "eps true"),
-    *("log strain", "déformation vraie", "déformation rationnelle", "logarithmische dehnung"),
-)
-_NOMINAL = ("engineering strain", "nominal strain", "technische dehnung", "déformation nominale")
-STATED_BY_NAME: Mapping[str, tuple[str, str]] = {
-    **dict.fromkeys(_TRUE, ("strain_measure", "logarithmic")),
-    **dict.fromkeys(_NOMINAL, ("strain_measure", "engineering")),
-    **dict.fromkeys(("total strain", "gesamtdehnung", "déformation totale"), ("includes_elastic", "yes")),
-    **dict.fromkeys(("ε tot", "eps tot", "ε total", "dehnung gesamt"), ("includes_elastic", "yes")),
-    **dict.fromkeys(("creep strain", "kriechdehnung", "déformation de fluage"), ("includes_elastic", "no")),
-    **dict.fromkeys(("plastische dehnung", "bleibende dehnung", "ceeq"), ("includes_elastic", "no")),
-}
-"""{name of a column of strains in small letters: key and text of the condition that it states}."""
-
-
-NAME_SYNONYMS: Mapping[str, str] = {
-    **{name: meaning for meaning, names in NAMES_OF.items() for name in names},
-    **dict.fromkeys(STATED_BY_NAME, "strain"),
-}
-"""{name in small letters: quantity or text key}."""
-
-
-SYMBOLS: Mapping[str, str] = {
-    **{"t": "time", "T": "temperature", "σ": "stress", "sigma": "stress", "ε": "strain", "epsilon": "strain"},
-    **{"P1": "pressure_1", "P2": "pressure_2", "Tj": "jump_time"},
-    **{"p": "pressure", "P": "pressure", "E": "modulus", "ν": "poisson", "nu": "poisson"},
-    **{"F": "force", "ΔL": "elongation", "Δl": "elongation", "ΔL0": "elongation", "dL": "elongation"},
-    **dict.fromkeys(("σ0", "σo", "σ₀", "R0", "Ro", "sig"), "stress"),
-    **dict.fromkeys(("eps", "ε_c", "εc", "ε_cr"), "strain"),
-    **dict.fromkeys(("d0", "D0", "D", "ø", "Ø", "⌀"), "diameter"),
-    **dict.fromkeys(("ΔD", "Δd", "dD"), "diameter_growth"),
-    **dict.fromkeys(("L0", "l0", "Lo", "Le", "Lr0"), "gauge_length"),
-    **dict.fromkeys(("S0", "A0", "So", "Ao"), "area"),
-    **dict.fromkeys(("h0", "H0", "h₀", "H₀"), "height"),
-}
-"""{symbol: quantity}; capitals matter."""
 
 
 _IN_BRACKETS = re.compile(r"([^()\[\]]*)[(\[]((?:[^()\[\]]|\(\w*\))*)[)\]]\s*([^()\[\]]*)")
@@ -251,6 +87,32 @@ def value_in(text: str, kind: QuantityKind, unit: str = "") -> float | None:
     match = _MEASURED.fullmatch(text)
     conversion = kind.units.get(unit_suffix(match[2] or unit) or "?") if match else None
     return conversion.factor * float(match[1].replace(",", ".")) + conversion.offset if match and conversion else None
+
+
+_NUMBER_AND_UNIT = re.compile(
+    r"(?P<before>[<>≥~≈]?\s*)(?P<number>[+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*(?P<unit>[^\s\d.,;()+-][^\s,;()]*)"
+    r"(?P<after>[\s(].*)?"
+)
+
+
+def unit_behind(cell: str, kind: QuantityKind) -> str:
+    """The unit of a kind that stands behind the number of a cell, `>3 days`; "" for none."""
+    match = _NUMBER_AND_UNIT.fullmatch(cell)
+    suffix = unit_suffix(match["unit"]) if match else None
+    return suffix if suffix and suffix in kind.units else ""
+
+
+def in_unit(cell: str, kind: QuantityKind, unit: str, decimal: str) -> str:
+    """A cell such as `>3 days` in a unit of the kind, >72 in hours, without it; "" where that cannot be."""
+    match, suffix = _NUMBER_AND_UNIT.fullmatch(cell), unit_behind(cell, kind)
+    if match is None or not suffix or unit not in kind.units:
+        return ""
+    number = match["number"].replace(decimal, ".")
+    if number.count(".") > 1 or "," in number:
+        return ""
+    one, other = kind.units[suffix], kind.units[unit]
+    value = (one.factor * float(number) + one.offset - other.offset) / other.factor
+    return f"{match['before']}{value:.10g}{match['after'] or ''}".replace(".", decimal)
 
 
 def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix) -> tuple[str, str]:
@@ -331,6 +193,8 @@ class NameTable:
             quantity = "strain"  # of its gauge length
         elif quantity == "strain" and unit_suffix(unit) in LENGTH.units and "elongation" in self.kinds:
             quantity = "elongation"
+        elif quantity == "force" and unit_suffix(unit) in STRESS.units and "stress" in self.kinds:
+            quantity = "stress"
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
             return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)
@@ -339,10 +203,11 @@ class NameTable:
 
 _NUMBERING = (
     r"names?|ids?|no|nr|(?<!\w)n|num(?:ber|mer|[ée]ro)?|nom|code|label|bezeichnung|kennung|r[ée]f[ée]rence|identif\w+"
+    r"|sigla|codice|c[óo]digo"
 )
 _OF_TESTS = re.compile(
     rf"(?:(?:{_NUMBERING}) )*(?:tests?|test piece|samples?|specimens?|proben?|pr[uü]fling|versuchs?|essai|[ée]prouvette"
-    rf"|[ée]chantillon|rep[èe]re)(?: ?(?:{_NUMBERING}))*"
+    rf"|[ée]chantillon|rep[èe]re|provino|provetta|prova|campione|probeta|ensayo|muestra)(?: ?(?:{_NUMBERING}))*"
 )
 
 
@@ -390,6 +255,7 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 TEXT_KEYS = (
     *("name", "alloy", "specimen", "operator", "control", "strain_measure", "stress_measure"),
     *("includes_elastic", "includes_loading", "ended", "noise_correlation", "steps_taken_off", "thermal_expansion"),
+    "modulus_by_temperature",
     *("decimal", "columns", "ignore", "strain_unit", "date_order", "time_zone"),
 )
 """Words that stand once for a whole test, beside steps and programs; the last line says how its table is written."""
@@ -422,7 +288,8 @@ class HeaderVocabulary:
         column of rupture times such a word may stand in the place of a number.
     labels : its keys and columns that are kept as labels though nothing is known of them.
     ignored : columns, as they are written in its files, that are left out.
-    stated : {key: text and place} of conditions that a file of answers beside a file states of its tests.
+    stated : {key: text and place} of conditions that a file of answers beside a file states of its tests. of_tests :
+        {name of a test: the same of that test alone}, `exclude` among its keys.
     """
 
     synonyms: Mapping[str, str] = field(default_factory=dict)
@@ -432,6 +299,7 @@ class HeaderVocabulary:
     labels: Collection[str] = ()
     ignored: Collection[str] = ()
     stated: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    of_tests: Mapping[str, Mapping[str, tuple[str, str]]] = field(default_factory=dict)
 
     def terms(self, specimen: str = "") -> Terms:
         """What headers and columns of a file may say; specimen : that the file names, whose own terms then count most.
@@ -454,6 +322,13 @@ class HeaderVocabulary:
             own_dimensions=[name for d in dimensions_of(known.get(specimen)) for name in d.names],
             changes=[(name, o) for name in named for o in outputs_of(known[name]) if o.change_of],
         )
+
+
+_AT_TEMPERATURE = re.compile(
+    r"(?P<name>.+?)[\s,(\[@]+(?:(?:at|bei|à|a)\s+)?(?P<number>\d+(?:[.,]\d+)?) ?(?P<degrees>(?:°|º|deg\.?)? ?[CKF])"
+    r"[)\]]?(?:[\s,/(\[]+(?P<unit>[GM]Pa|ksi|Msi)[)\]]?)?"
+)
+"""A quantity at a temperature, `E (650 °C)`, `Young's modulus at 650 °C [GPa]`."""
 
 
 @dataclass(frozen=True)
@@ -542,6 +417,8 @@ class Terms:
             return name
         if name.startswith(("label ", "geometry ")):
             return name
+        if (at := _AT_TEMPERATURE.fullmatch(name)) and self.conditions.meaning(at["name"].strip()) == "modulus":
+            return f"modulus_at {at['number']} {at['degrees']}|{at['unit'] or ''}"
         if names_tests(name):
             return "name"
         is_label = label.startswith("label ") and unit_suffix(unit) == ("pct" if unit else None)

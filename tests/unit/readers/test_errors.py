@@ -11,8 +11,9 @@ from creepkit.errors import HistoryError
 from creepkit.quality import check_data_quality
 from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed_folders import INDEXED_TABLE
+from creepkit.readers.names import NAME_SYNONYMS
 from creepkit.readers.tests_in_rows import TEST_TABLE
-from creepkit.readers.vocabulary import NAME_SYNONYMS, HeaderVocabulary, plain_name
+from creepkit.readers.vocabulary import HeaderVocabulary, plain_name
 from creepkit.records import History
 from creepkit.records.quantities import LENGTH
 from helpers.misspellings import misspelt_keys

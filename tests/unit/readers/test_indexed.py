@@ -191,7 +191,7 @@ def test_a_step_after_an_interruption_is_taken_off(tmp_path):
     [
         ('["a.csv"]\nstres_MPa = 5\n', "stres_MPa: is no key; did you mean 'stress_MPa'?"),
         ('["a.csv"]\ncolums = {x = "y"}\n', "colums: is no key; did you mean 'columns'?"),
-        ('["a.csv"]\nwhatever = 1\n', "is no key; allowed are columns, ended, parts, and conditions"),
+        ('["a.csv"]\nwhatever = 1\n', "is no key; allowed are columns, ended, parts, tests, and conditions"),
         ('["a.csv"]\nended = {x = "broke"}\n', "'broke' is no end; allowed: ruptured, stopped, label"),
         ('["a.csv"]\ncolumns = "x"\n', "write {name of a column = what it is}"),
         ("stress_MPa = 5\n", 'stands in no table; begin with the files that it is about, such as ["*.csv"]'),

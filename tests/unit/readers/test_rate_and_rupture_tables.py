@@ -81,7 +81,7 @@ REFUSED = [
     (("[%/h]", ""), r"table.csv:3: column 'min creep rate' has no unit; allowed: 1/s, 1/min, 1/h"),
     (("[%/h]", "[%]"), r"table.csv:3: column 'min creep rate \[%\]' has the unit 'pct', which is not understood"),
     (("2.1e-4", "0"), r"table.csv:4: 'min_?.*' is 0; a creep rate must lie above 0"),
-    (("2.1e-4", "slow"), r"table.csv:4: .* is 'slow'"),
+    (("2.1e-4", "2.1x"), r"table.csv:4: .* is '2.1x'"),
     (("A2,", "A1,"), r"table.csv:5: test 'A1' already stands in .*table.csv:4; give each row its own name"),
     (("1e-3", ""), r"table.csv:6: no frames, no minimum creep rate and no end of the test"),
     ((">10000", "10000*"), r"table.csv:5: .* is '10000\*'"),
