@@ -19,7 +19,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import scaled_inverse
-from creepkit.records import History, Prediction, Predictor, Status, output_unit
+from creepkit.records import History, Prediction, Predictor, Status
 
 REMAINING_DEFECT = 0.1
 """Of a defect, standard deviation of what is left of it."""
@@ -54,18 +54,6 @@ class NumericalError:
     def remaining(self) -> dict[str, float]:
         """{output: standard deviation} of what is left of the error, in the output's unit."""
         return {name: REMAINING_DEFECT * size for name, size in self.size.items()}
-
-    @property
-    def sentence(self) -> str:
-        """For people: what differed, by how much, and what it would have done to the values."""
-        sizes = ", ".join(f"{size:.2g} {output_unit(name)}".strip() + f" in {name}" for name, size in self.size.items())
-        return (
-            f"at the optimum {self.predictor} differs from {self.refined} by {sizes} (rms); at most {self.noises:.2g} "
-            f"noises. This is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
-            + "deviations"
-            + (f"; {', '.join(self.incomplete)} could not be corrected" if self.incomplete else "")
-            + ("; a further correction may move them again" if not self.settled else "")
-        )
 
 
 def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquaresProblem, NumericalError | None]:

@@ -153,6 +153,13 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
         return headline(self)
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What limits the trust in it, a sentence each: its notes, and what its numbers say."""
+        from creepkit.reports.remarks import remarks
+
+        return remarks(self)
+
+    @property
     def values(self) -> dict[str, float]:
         """{parameter: value} in the author's units."""
         return {e.name: e.value for e in self.estimates}

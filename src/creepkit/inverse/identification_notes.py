@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -28,7 +28,6 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import (
     reference_end_strain,
     reference_stresses,
-    simulated_stresses,
     spans_temperatures,
     usable_frames,
 )
@@ -49,16 +48,15 @@ PAUSE = 0.1
 """Of the largest stress of a test under a load: below it, as in a pause or a loading ramp, hardly anything creeps."""
 
 
-def fitted_ranges(problem: LeastSquaresProblem, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+def fitted_ranges(problem: LeastSquaresProblem, simulated: Sequence[Floats]) -> dict[str, tuple[float, float]]:
     """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames, MPa, K, s; and of conditions.
 
-    values : of the law, by which stresses are simulated where they change while specimens creep.
+    simulated : of each test (stresses,) MPa, those that it goes through.
     """
     tests = problem.histories
-    simulated = [(h, simulated_stresses(problem.law, values, h, problem.predictor)) for h in tests]
     stresses = [
         float(v)
-        for h, of_test in simulated
+        for h, of_test in zip(tests, simulated, strict=True)
         for v in of_test
         if h.loading.quantity == "strain" or v >= PAUSE * of_test.max()
     ]
@@ -157,16 +155,6 @@ def identification_notes(estimation: EstimationResult, nuisances: Sequence[Nuisa
         if min(n.value - low, high - n.value) < 1e-4 * (high - low):
             sentences.append(f"the {n.key} of '{n.owner}' lies at its bound, {n.value:.4g}")
     return tuple(sentences)
-
-
-def one_end_note(minima: Mapping[str, int]) -> tuple[str, ...]:
-    """That a search had one start alone, if it had.
-
-    minima : see inverse.search.multistart.
-    """
-    if minima.get("search_ends") != 1:
-        return ()
-    return ("the search ended once: whether another minimum is lower was not examined (raise starts)",)
 
 
 def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:

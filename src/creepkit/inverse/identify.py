@@ -23,13 +23,7 @@ from creepkit.inverse.defect_correction import (
 from creepkit.inverse.goodness_of_fit import pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_notes import (
-    domain_notes,
-    fitted_ranges,
-    identification_notes,
-    one_end_note,
-    provenance_of,
-)
+from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
 from creepkit.inverse.iterative_estimation import (
     APPROXIMATE_LIMITS,
     EXACT_LIMITS,
@@ -46,7 +40,7 @@ from creepkit.inverse.judging import Judge
 from creepkit.inverse.kept_fits import kept_where_asked
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
 from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
-from creepkit.inverse.nuisance_parameters import nuisance_estimates_of, unmodelled_note
+from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbations import (
     LIFE,
@@ -67,7 +61,6 @@ from creepkit.inverse.single_values import LawAtTests, contradicting_values
 from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
-    cut_interval_notes,
     freedom_of_intervals,
     parameter_estimates,
     positive_semidefinite,
@@ -370,7 +363,8 @@ def _reported(
     """Noise model, intervals, judgement and goodness of fit, all at the reported values."""
     estimator = _working_estimator(found.problem, numerical_error)
     best = within_bounds(at_reported_values(found) if estimator.by_likelihood else found)
-    problem, linear, x = best.problem.with_simulated_stresses(best.x), best.linear, best.x
+    linear, x, stresses = best.linear, best.x, best.problem.simulated_stresses(best.x)
+    problem = best.problem.with_stresses(stresses)
     noise_model = estimator.final(linear, best.noise, problem.parameter_count)
     law, coordinates, count, residuals = problem.law, problem.coordinates, problem.parameter_count, linear.residuals
     u = x[:count]
@@ -431,7 +425,7 @@ def _reported(
         effective_frames=effective_sample_size(residuals, noise_model),
         freedom=freedom_of_intervals(by_tests_alone, estimated),
         tests=tests,
-        ranges=fitted_ranges(problem, {e.name: e.value for e in estimates}),
+        ranges=fitted_ranges(problem, stresses),
         settings=problem.settings,
         provenance={**provenance_of(problem, search_outcome.evaluations), **search_outcome.minima},
         errors=pooled_errors(histories, prediction, tests),
@@ -446,12 +440,7 @@ def _reported(
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, nuisance_estimates),
-            *one_end_note(search_outcome.minima),
-            *(nuisance.sentence for nuisance in implausible),
-            *cut_interval_notes(law, estimates),
             *domain_notes(prediction, histories),
-            *([numerical_error.sentence] if numerical_error is not None else []),
-            *unmodelled_note(unmodelled),
         ),
         histories=tuple(histories),
         predictor=problem.predictor,

@@ -46,42 +46,6 @@ class ImplausibleNuisance:
     size_source: str
     share: float
 
-    @property
-    def description(self) -> str:
-        """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"."""
-        article = "an" if self.kind[0] in "aeiou" else "a"
-        where = f"in {self.output} of '{self.owner}'" if self.output else f"in '{self.owner}'"
-        return f"{article} {self.kind} of {self._amount} {where}{self._share}"
-
-    @property
-    def sentence(self) -> str:
-        """The note of an identification."""
-        size = {
-            "stated": "the standard deviation that was stated for it",
-            "noise": "the noise of a frame",
-            "usual": f"a usual {self.kind}",
-        }[self.size_source]
-        return (
-            f"the {self.kind}{f' of {self.output}' if self.output else ''} of '{self.owner}' is {self._amount}"
-            f"{self._share}, {self.standard_deviations:.2g} times {size} ({_amount(self.size, self.unit)}): it stands "
-            "for more than its name says, look at the test or try another law"
-        )
-
-    @property
-    def _amount(self) -> str:
-        return _amount(self.value, self.unit)
-
-    @property
-    def _share(self) -> str:
-        if not np.isfinite(self.share):
-            return ""
-        whole = "its largest value" if self.output else "its nominal length"
-        return f", {100 * self.share:.2g} % {'of' if self.output else 'from'} {whole}"
-
-
-def _amount(value: float, unit: str) -> str:
-    return f"{value:.2g}{' ' + unit if unit else ''}"
-
 
 def implausible_nuisances(
     problem: LeastSquaresProblem, random_effects: tuple[Floats, Floats], estimates: Sequence[NuisanceEstimate]

@@ -180,12 +180,14 @@ class LeastSquaresProblem:
 
     # ---- variants ------------------------------------------------------------------------------------------------
 
-    def with_simulated_stresses(self, x: Floats) -> LeastSquaresProblem:
-        """The same with the stresses that tests go through at unknowns x (unknowns,)."""
+    def simulated_stresses(self, x: Floats) -> list[Floats]:
+        """Of each test (stresses,) MPa, those that it goes through at unknowns x (unknowns,)."""
         values = self.coordinates.values(x[: self.parameter_count])
-        stresses = [simulated_stresses(self.law, values, h, self.predictor) for h in self.histories]
-        conditions = [*map(condition_at, stresses, self.histories)]
-        return replace(self, conditions=np.array(conditions).T)
+        return [simulated_stresses(self.law, values, h, self.predictor) for h in self.histories]
+
+    def with_stresses(self, stresses: Sequence[Floats]) -> LeastSquaresProblem:
+        """The same with the stresses that each test goes through, (stresses,) MPa."""
+        return replace(self, conditions=np.array([*map(condition_at, stresses, self.histories)]).T)
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
         """A law of some of this one's parameters, by name, on the same data and covariance."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 RANKING = DocumentFormat(
     "creepkit-ranking",
-    2,
+    3,
     FileKind("a ranking", FitError, "give a ranking.json that 'creepkit identify' wrote"),
     remedy="identify again",
 )

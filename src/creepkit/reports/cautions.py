@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
-from creepkit.inverse.nuisance_parameters import beyond_intervals, combined_change_text
+from creepkit.inverse.nuisance_parameters import beyond_intervals
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import time_text
 from creepkit.reports.blocks import named, number
 from creepkit.reports.description import rejected
+from creepkit.reports.remarks import challenge_text, combined_change_text, nuisance_text, test_change_text
 from creepkit.reports.verdicts import cause_caution, cause_headline, unmet_text
 from creepkit.reports.words import CAUTIONS, IN_EACH_TEST, ONE_ALONE, REASONS
 
@@ -94,7 +95,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
         yield cause_caution(adequacy.mentioned)
     if adequacy.remedies and not adequacy.explanations:
         yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
-    yield from (CAUTIONS["implausible"].format(nuisance=one.description) for one in adequacy.implausible[:1])
+    yield from (CAUTIONS["implausible"].format(nuisance=nuisance_text(one)) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
         yield CAUTIONS["noise unknown"]
 
@@ -130,7 +131,7 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
     if others:
         yield CAUTIONS["undecided"].format(laws=named(others, "law"))
     same = f"{ranking.best.law.name} above "  # a threshold
-    yield from (str(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
+    yield from (challenge_text(one).replace(same, "the same law above ") for one in (ranking.challenges or ())[:1])
     if not (others or ranking.challenges or ranking.adequacy.rejects):
         yield from (unmet_text(ranking, name) for name in ("weight", "challenges") if name in ranking.unmet)
 
@@ -152,7 +153,7 @@ def _precision(fit: Identification) -> Iterator[str]:
         left_out = beyond_intervals(fit.unmodelled)
         kinds = " and ".join(dict.fromkeys(one.description for one in left_out[:2]))
         kinds += IN_EACH_TEST * (left_out[0].tests > 1)
-        single = max((one.test_change_text for one in left_out if one.tests > 1), default="")
+        single = max((test_change_text(one) for one in left_out if one.tests > 1), default="")
         alone = ONE_ALONE.format(change=single) if single else ""
         yield CAUTIONS["not included"].format(kinds=kinds, change=change, alone=alone)
 

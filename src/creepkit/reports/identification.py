@@ -13,7 +13,7 @@ from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.noise_model import MINIMUM_TESTS
-from creepkit.inverse.nuisance_parameters import NOT_INCLUDED, beyond_intervals, nuisance_unit
+from creepkit.inverse.nuisance_parameters import beyond_intervals, nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION, Correlation
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
@@ -38,9 +38,10 @@ from creepkit.reports.compared_values import (
     judged_readings,
     misfit_of,
 )
-from creepkit.reports.description import rejected
+from creepkit.reports.description import mean_misfit_text, rejected
 from creepkit.reports.identification_plot import residual_caption, small_multiples
 from creepkit.reports.rate_panels import rupture_rows
+from creepkit.reports.remarks import perturbation_text, remarks
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -93,10 +94,9 @@ def value_blocks(fit: Identification, verdict: str = "", equivalents: Sequence[s
     blocks += [] if fit.sparsity is None else [Paragraph(fit.sparsity.verdict)]
     if not rejected(fit):
         blocks.append(Items(fit.undetermined(), "what these tests do not determine, or poorly, given this law:"))
-    unmodelled = [effect.sentence for effect in beyond_intervals(fit.unmodelled)]
+    unmodelled = [perturbation_text(effect) for effect in beyond_intervals(fit.unmodelled)]
     blocks.append(Items(unmodelled, "the intervals do not include what would move the rate amid the tests:"))
-    notes = [note for note in fit.notes if not (unmodelled and note.startswith(NOT_INCLUDED))]  # said above
-    return [*blocks, Items(notes, "remarks:")]
+    return [*blocks, Items(remarks(fit, perturbations=False), "remarks:")]
 
 
 def _values(fit: Identification) -> Table:
@@ -425,9 +425,13 @@ def identification_comments(fit: Identification, ranking: Ranking | None = None)
     chosen = f"; {chosen_text(ranking)}" if ranking is not None and len(ranking.laws) > 1 else ""
     intervals = [f"{e.name} {' to '.join(interval_ends(fit.law, e))}" for e in fit.estimates]
     held = " (if the law held, which the tests reject)" if rejected(fit) else ""
-    lines = [fit.headline, f"{origin}{chosen}", f"95 % intervals{held}: {', '.join(intervals)}"]
+    lines = [
+        fit.headline,
+        "; ".join(filter(None, (f"{origin}{chosen}", mean_misfit_text(fit)))),
+        f"95 % intervals{held}: {', '.join(intervals)}",
+    ]
     lines += [*_range_lines(fit), *cautions(fit, ranking)[:MOST_CAUTIONS]]
-    return [line.replace("°C", "C") for line in lines]  # sources in Fortran hold ASCII alone
+    return [line.replace("°C", "C").replace("–", " to ") for line in lines]  # sources in Fortran hold ASCII alone
 
 
 def _range_lines(fit: Identification) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
 from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
+from creepkit.reports.remarks import challenge_text
 from creepkit.reports.terminal import print_table, tell, tell_written
 from creepkit.reports.verdicts import scatter_text, verdict_text
 from creepkit.reports.words import COMPARED
@@ -54,7 +56,7 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
     blocks: list[Block] = [_table(ranking), Items(_behind(ranking))]
     if any(math.isfinite(one.chi_square) for one in ranking.laws):
         blocks.append(Paragraph(COMPARED["chi-square"], "note"))
-    blocks.append(Items([*map(str, ranking.challenges or ())], "what the tests allow beside the best law:"))
+    blocks.append(Items([*map(challenge_text, ranking.challenges or ())], "what the tests allow beside the best law:"))
     blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
     if figures is not None and ranking.best.tests:
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
@@ -126,12 +128,13 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
 
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
     """The same as JSON-able data."""
+    challenges = ranking.challenges
     return {
         "headline": ranking.best.headline,
-        **{
-            name: getattr(ranking, name)
-            for name in ("verdict", "decisive", "adequacy", "further", "failed", "challenges")
-        },
+        **{name: getattr(ranking, name) for name in ("verdict", "decisive", "adequacy", "further", "failed")},
+        "challenges": None
+        if challenges is None
+        else [asdict(one) | {"sentence": challenge_text(one)} for one in challenges],
         "laws": [{**_fit_to_json(one.fit), "excess": one.excess, "weight": one.weight} for one in ranking.laws],
         "files": [str(path) for path in written],
     }
@@ -143,7 +146,7 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
         **{f"rms_ln_{name}": fit.rms for name in fit.errors if is_logarithmic(name)},
         "parameters": {e.name: fields_to_json(e, "value low high unit verdict") for e in fit.estimates},
         **{name: getattr(fit, name) for name in ("errors", "adequacy", "numerical_error", "nuisances", "noise_model")},
-        "notes": list(fit.notes),
+        "notes": list(fit.remarks),
     }
 
 

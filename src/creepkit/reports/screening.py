@@ -13,6 +13,7 @@ from creepkit.reports.answer import table_of_groups
 from creepkit.reports.blocks import Paragraph, as_text
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
+from creepkit.reports.remarks import numerical_error_text
 from creepkit.screening.results import AlloyResult, result_columns
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def summary_lines(plate: ScreeningResult) -> list[str]:
     for result in plate.identified:
         error = result.best.numerical_error
         if error is not None and not error.confirms:
-            lines.append(f"{result.alloy}: not confirmed: {error.sentence}")
+            lines.append(f"{result.alloy}: not confirmed: {numerical_error_text(error)}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 

@@ -19,6 +19,7 @@ from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALU
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import first_of
+from creepkit.reports.remarks import challenge_text, nuisance_text
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
@@ -269,7 +270,7 @@ def qualification(found: Adequacy) -> str:
         return ""
     more = len(found.implausible) - 1
     others = f" (and {more} more such nuisance{'s' * (more > 1)})" if more else ""
-    return f", but only with {found.implausible[0].description}{others}"
+    return f", but only with {nuisance_text(found.implausible[0])}{others}"
 
 
 def contradiction_text(found: ContradictingValues) -> str:
@@ -346,7 +347,7 @@ def unmet_text(ranking: Ranking, condition: str) -> str:
     if condition == "adequacy":
         return _of_best(ranking)
     if condition == "challenges" and ranking.challenges is not None:
-        return "; and ".join(one.sentence for one in ranking.challenges if one.refutes)
+        return "; and ".join(challenge_text(one) for one in ranking.challenges if one.refutes)
     return {
         "alternatives": f"only {ranking.best.law.name} was fitted",
         "convergence": "the search for its values did not converge",
@@ -363,7 +364,7 @@ def ranking_verdict(ranking: Ranking) -> str:
         return f"{unmet_text(ranking, 'alternatives')}; {_of_best(ranking)}"
     same = f"; {same}" if same else ""
     if not unmet:
-        allowed = "".join(f"; but {challenge}" for challenge in ranking.challenges or ())
+        allowed = "".join(f"; but {challenge_text(challenge)}" for challenge in ranking.challenges or ())
         return f"decisive: {best}, of {len(ranking.laws)} laws tried; {_of_best(ranking)}{same}{allowed}"
     return f"not decisive: {_reason(ranking)}{same}"
 

@@ -157,7 +157,7 @@ OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
 
-CODES, MORE_CODES = "In {codes}", "creepkit export writes them, and those of other codes"
+CODES, MORE_CODES = "In {codes}", "creepkit export, also for other codes"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 

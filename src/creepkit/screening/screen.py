@@ -78,7 +78,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         decisive=ranking.decisive,
         equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
         dense_fit=dense,
-        notes=(*notes, *best.notes),
+        notes=(*notes, *best.remarks),
     )
 
 

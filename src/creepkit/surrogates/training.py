@@ -50,7 +50,7 @@ def epochs_since_best(losses: Sequence[float]) -> int:
     return len(finite) - 1 - finite.index(min(finite)) if finite else 0
 
 
-VALIDATION_BATCH = {"cpu": 256, "cuda": 2048}
+VALIDATION_BATCH = {"cpu": 256, "cuda": 1024}
 """Rows in a batch without gradients: as many as a cache holds, and as fill a GPU."""
 
 

@@ -267,7 +267,7 @@ def test_a_law_that_needs_a_large_offset_explains_only_with_it():
     assert named.standard_deviations == pytest.approx(0.3 / 2e-3, rel=0.03)
     assert named.share == pytest.approx(share, rel=0.03)
     assert f"only with an offset of 0.3 mm in amplitude of '{test.name}', {100 * share:.2g} %" in str(adequacy)
-    (note,) = (n for n in fit.notes if "offset of amplitude" in n and "the noise of a frame (0.002 mm)" in n)
+    (note,) = (n for n in fit.remarks if "offset of amplitude" in n and "the noise of a frame (0.002 mm)" in n)
     assert f"{named.standard_deviations:.2g} times" in note
 
 

@@ -17,7 +17,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError, ReportError
 from creepkit.exporters.documents import equations_in_latex, law_equations
 from creepkit.inverse.identify import identify
-from creepkit.inverse.nuisance_parameters import Perturbation, combined_change_text
+from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import Ranking, rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -32,6 +32,7 @@ from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import plate_figure
+from creepkit.reports.remarks import combined_change_text
 from helpers.rate_tables import whole_life_table
 from helpers.report_pages import contents, ranking
 from helpers.steady_rate_predictor import Steady, planted

@@ -75,6 +75,9 @@ def test_what_is_to_be_done_names_one_test_with_its_stress_temperature_and_time(
 def test_finite_element_codes_have_a_power_law_built_in_and_need_a_routine_for_damage(steady):
     assert codes_text(steady).startswith("In Abaqus: *CREEP, LAW=STRAIN; CalculiX: *CREEP, LAW=")
     assert "Ansys: TB,CREEP,1,1,3,10" in codes_text(steady)
+    source = ck.export(steady, "abaqus")
+    assert source.isascii()  # as Fortran is
+    assert "for 80 to 200 MPa, 627 C: a new test's rate" in " ".join(source.replace("!", "").split())
 
 
 def test_the_row_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_intervals(steady):

@@ -71,11 +71,12 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
         train(data, SMALL, to=path, seed=4)
 
 
-def test_the_rate_grows_with_the_root_of_the_batch_unless_it_is_given(data: Dataset) -> None:
+def test_the_rate_grows_with_the_batch_unless_it_is_given(data: Dataset) -> None:
     for training, rate in (
         (Training(epochs=1, batch=64), 1e-3),
-        (Training(epochs=1, batch=1024, schedule="cosine"), 4e-3),
+        (Training(epochs=1, batch=1024, schedule="cosine"), 8e-3),
         (Training(epochs=1, batch=1024, rate=2e-4), 2e-4),
+        (Training(epochs=1, batch=100_000), 1e-2),
     ):
         assert train(data, SMALL, training=training).metadata.curves["rate"] == [pytest.approx(rate, rel=1e-12)]
 

@@ -39,7 +39,7 @@ from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_EXCESS, DECISIVE_WEIGHT, evidence_weights
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel
-from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, prior_mean
+from creepkit.inverse.nuisance_parameters import OFFSET, Perturbation, prior_mean
 from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import System, Tolerances
@@ -60,22 +60,43 @@ MOST_NAMED = 2
 
 
 @dataclass(frozen=True)
+class PerturbationSize:
+    """A perturbation of the size that it takes: kind and unit as of a Perturbation, "%" of a length.
+
+    tests : how many have it. differs : whether each has its own, of which it is the largest.
+    """
+
+    kind: str
+    size: float
+    unit: str
+    tests: int = 1
+    differs: bool = False
+
+
+@dataclass(frozen=True)
 class Challenge:
     """Something that the tests allow, so that the law of most weight is not proved.
 
     kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
         of the law that is allowed, or the effect.
-    sentence : for people, to follow "but". refutes : whether the law is not decisive for it. A sum that explains the
-        tests no better than by chance does not: it says how much of another law they allow.
+    refutes : whether the law is not decisive for it. A sum that explains the tests no better than by chance does not:
+        it says how much of another law they allow.
+    other : the other law, of a sum or to which the weight goes. size : its share of the rate, or the threshold in MPa.
+    excess : chi-square above that of the best law, None where that could not be found. fits_better : than by chance.
+    sizes : of the effect, with any of which `laws` explain the tests; its usual one where no law does. weights : of the
+        best and of the other law with it, where that is known.
     """
 
     kind: Literal["sum", "threshold", "unmodelled effect"]
     subject: str
-    sentence: str
     refutes: bool = True
-
-    def __str__(self) -> str:
-        return self.sentence
+    other: str = ""
+    size: float = 0.0
+    excess: float | None = None
+    fits_better: bool = False
+    sizes: tuple[PerturbationSize, ...] = ()
+    laws: tuple[str, ...] = ()
+    weights: tuple[float, ...] = ()
 
 
 Scope = Literal["test", "all"]
@@ -107,26 +128,17 @@ class Trial:
         """Whether it is the error of a length of the test pieces."""
         return is_length_nuisance(self.effects[0].kind) and not self.effects[0].kind.startswith(OFFSET)
 
-    def description(self, fits: Sequence[Identification], law: int) -> str:
+    def size(self, fits: Sequence[Identification], law: int) -> PerturbationSize:
         """The perturbation with the size that it has in the linear problem of a law, by its position."""
         fit, common = fits[law], self.scope == "all"
         sizes = sizes_of_effect(fit.linear_problem, self.effects[law], self.noise_model, common=common)
         effect, tests, differ = self.effects[law], len(fit.tests), sizes.size > 1
-        size = float(np.abs(sizes).max()) if differ else float(sizes[0])
-        where = "the test" if tests == 1 else f"each of the {tests} tests"
+        size, unit = effect.size * (float(np.abs(sizes).max()) if differ else float(sizes[0])), effect.unit
         if self.is_of_length:
             predictor = fit.least_squares_problem.predictor
             nominal = float(np.median([prior_mean(Nuisance(effect.kind), h, predictor) for h in fit.histories]))
-            share = f"{abs(100 * size * effect.size / nominal):.2g} %"
-            if differ:
-                return f"independent errors of up to {share} in the {effect.kind} of {where}"
-            return f"a {effect.kind} {share} {'smaller' if size < 0 else 'larger'}{f' in {where}' if tests > 1 else ''}"
-        amount, unit = f"{size * effect.size:{'' if differ else '+'}.2g}", effect.unit.removesuffix(" over a test")
-        amount = f"{'up to ' if differ else ''}{amount} {unit}".strip()
-        if effect.kind == DRIFT:
-            return f"{'independent drifts' if differ else 'a drift'} of the temperature of {amount} over {where}"
-        output = effect.kind.removeprefix(OFFSET).replace("_", " ")
-        return f"{'independent offsets' if differ else 'an offset'} of {amount} in the {output} of {where}"
+            size, unit = 100.0 * size / nominal, "%"
+        return PerturbationSize(effect.kind, size, unit.removesuffix(" over a test"), tests, differ)
 
 
 def _under_errors(fits: Sequence[Identification], tried: Sequence[Perturbation] = ()) -> CommonCovarianceFits:
@@ -166,14 +178,10 @@ def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
         if weight > DECISIVE_WEIGHT or weight >= challenges.get(effect.kind, (np.inf,))[0]:
             continue
         rival = 1 + int(np.argmax(weights[1:]))
-        name, weight_of_rival = fits[rival].law.name, f"{weights[rival]:.2f}"
-        sentence = (
-            f"with {trial.description(fits, rival)} {name} would explain them (weight {weight_of_rival})"
-            if _explains_with(fits[rival], trial.effects[rival])
-            else f"{effect.description}, which was not modelled, would leave it a weight of {weight:.2f} "
-            f"({name}: {weight_of_rival})"
-        )
-        challenges[effect.kind] = weight, Challenge("unmodelled effect", effect.kind, sentence)
+        name, explains = fits[rival].law.name, _explains_with(fits[rival], trial.effects[rival])
+        size = trial.size(fits, rival) if explains else PerturbationSize(effect.kind, effect.size, effect.unit)
+        found = Challenge("unmodelled effect", effect.kind, other=name, sizes=(size,), laws=(name,) * explains)
+        challenges[effect.kind] = weight, replace(found, weights=(weight, float(weights[rival])))
     return tuple(challenge for _, challenge in challenges.values())
 
 
@@ -210,10 +218,9 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
     for other_score, law, trial in sorted(raised, key=lambda one: one[0]):
         if law == laws[0] and other_score < score + DECISIVE_EXCESS:
             by_kind.setdefault(trial.effects[0].kind, trial)
-    texts = [trial.description(fits, laws[0]) for trial in by_kind.values()]
-    names = " or ".join(fits[law].law.name for law in laws[:MOST_NAMED])
-    sentence = f"with {' or with '.join(texts[:MOST_NAMED])} {names} would explain them"
-    return (Challenge("unmodelled effect", best.effects[0].kind, sentence),)
+    sizes = tuple(trial.size(fits, laws[0]) for trial in [*by_kind.values()][:MOST_NAMED])
+    names = tuple(fits[law].law.name for law in laws[:MOST_NAMED])
+    return (Challenge("unmodelled effect", best.effects[0].kind, sizes=sizes, laws=names),)
 
 
 def _explains_with(fit: Identification, effect: Perturbation) -> bool:
@@ -234,10 +241,6 @@ NOT_EXCLUDED = float(chi2.ppf(0.95, 1))
 """Increase of chi-square up to which a sum is not excluded."""
 
 
-SMALLEST_SHOWN = 0.05
-"""Difference of two chi-squares below which they are shown as the same."""
-
-
 SHARE_TOLERANCE = 1e-3
 """Of ln of the ratio of rates, within which a sum keeps its share."""
 
@@ -247,6 +250,11 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3, gain=1e-3)
 
 
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6, gain=1e-4)
+"""Of the best law, from which excesses count."""
+
+
+PROMISED = 0.05
+"""Of chi-square: of a step of an altered law that would lower it by less, the promise is enough."""
 
 
 FAR_EXCLUDED, EXCLUDED_BY_STEP = 10.0 * NOT_EXCLUDED, 6.0 * NOT_EXCLUDED
@@ -293,11 +301,7 @@ def _alterations(fits: Sequence[Identification]) -> Iterator[tuple[Kind, str, Ca
     best, summands = FittedLaw.at_least_chi_square(fits[0]), set(fits[0].law.name.split("+"))
     for fit in fits[1:]:
         if summands.isdisjoint(fit.law.name.split("+")):
-            yield (
-                "sum",
-                f"a sum with {fit.law.name}",
-                partial(sum_with_share, best, FittedLaw(fit.least_squares_problem, fit.x)),
-            )
+            yield ("sum", fit.law.name, partial(sum_with_share, best, FittedLaw(fit.least_squares_problem, fit.x)))
     if not any(cut.has(stress) for term in best.law.terms.values() for cut in term.atoms(sympy.Max)):
         yield "threshold", f"{best.law.name} above a threshold", partial(above_threshold, best)
 
@@ -306,11 +310,11 @@ def _challenge(kind: Kind, name: str, fitted: Callable[[], AlteredLaw | None]) -
     try:
         found = fitted()
     except CreepkitError:
-        return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
+        return Challenge(kind, name, other=name)
     if found is None or found.excess > NOT_EXCLUDED:
         return None
-    refutes = found.excess <= found.refuting_excess
-    return Challenge(kind, found.problem.law.name, f"{found.description} {found.comparison}", refutes)
+    refutes, of = found.excess <= found.refuting_excess, found.problem.law.name
+    return Challenge(kind, of, refutes, name, found.size, found.excess, found.fits_better)
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -383,7 +387,7 @@ class AlteredLaw:
 
     x : (unknowns,) its values. excess : its chi-square above that of the best law.
     constraints : (rows, unknowns) derivatives over tolerances of what was held, such as the share of a second law.
-    further : its parameters beyond those of the best law, of which one is held. description : what it is, for people.
+    further : its parameters beyond those of the best law, of which one is held. size : the share, or threshold in MPa.
     """
 
     kind: Kind
@@ -392,7 +396,7 @@ class AlteredLaw:
     excess: float
     constraints: Floats
     further: int
-    description: str
+    size: float
 
     @property
     def fits_better(self) -> bool:
@@ -407,16 +411,6 @@ class AlteredLaw:
     @property
     def _by_chance(self) -> float:
         return float(chi2.ppf(0.95, max(self.further - 1, 1)))
-
-    @property
-    def comparison(self) -> str:
-        """How it compares with the best law, to follow its description."""
-        if self.fits_better:
-            return f"fits better (its chi-square is {-self.excess:.1f} lower)"
-        if abs(self.excess) < SMALLEST_SHOWN:
-            return "explains them as well (its chi-square is the same)"
-        how, side = ("is not excluded", "higher") if self.excess > 0 else ("explains them as well", "lower")
-        return f"{how} (its chi-square is {abs(self.excess):.1f} {side})"
 
 
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
@@ -435,8 +429,7 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     excess, x = _least_excess(best, problem, x, share=share)
     if _are_one_function(problem, x, own_terms):
         return None
-    description = f"a share of {100 * SHARE:.0f} % of the rate by {other.law.name}"
-    return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, description)
+    return AlteredLaw("sum", problem, x, excess, share(x)[1], other.u.size, SHARE)
 
 
 def above_threshold(best: FittedLaw) -> AlteredLaw:
@@ -454,7 +447,7 @@ def above_threshold(best: FittedLaw) -> AlteredLaw:
     excess, x = _least_excess(best, problem, x, fixed={position: threshold})
     held = np.zeros((1, x.size))
     held[0, position] = 1.0 / (SHARE_TOLERANCE * threshold)
-    return AlteredLaw("threshold", problem, x, excess, held, 1, f"{law.name} of {threshold:.3g} MPa")
+    return AlteredLaw("threshold", problem, x, excess, held, 1, threshold)
 
 
 def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:
@@ -492,7 +485,8 @@ def _least_excess(
 
     It is sought by the reduced-order model, then by the predictor itself where that does not exclude it by far.
     """
-    least, last = best.problem.chi_square(best.x), LAST_STEPS
+    least = best.problem.chi_square(best.x)
+    last = replace(LAST_STEPS, gain=PROMISED / least)
     if best.reduced is not None:
         cheap = problem.with_predictor(best.reduced.predictor).with_correction(best.reduced.correction)
         found = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS)
@@ -500,5 +494,5 @@ def _least_excess(
         if found.converged and excess > FAR_EXCLUDED:
             return excess, x
         last = replace(last, wanted=0.5 * (least + EXCLUDED_BY_STEP))
-    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=last).x
-    return problem.chi_square(x) - least, x
+    end = problem.minimise(x, additional=share, fixed=fixed, tolerances=last)
+    return problem.chi_square(end.x) - 2.0 * (end.cost - end.promised) - least, end.x

@@ -151,15 +151,6 @@ def parameter_estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, cova
     return tuple(results)
 
 
-def cut_interval_notes(law: CreepLaw, estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """Intervals that a bound of the search cuts off, a sentence each: those of functions of the value are not cut."""
-    return tuple(
-        f"the interval of {name} ends at its bound, {bound:.4g}, and not by the tests: intervals of rates and of the "
-        "local exponent do not know this bound and may reach beyond it"
-        for name, bound in cut_intervals(law, estimates).items()
-    )
-
-
 def cut_intervals(law: CreepLaw, estimates: Sequence[Estimate]) -> dict[str, float]:
     """{parameter that the tests bound on one side only: bound at which its interval ends}."""
     found = {}

@@ -30,6 +30,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, StressSteps, constant_stress
+from creepkit.reports.remarks import challenge_text
 from helpers.planted_bars import BAR, END, SPL, M, N, bars
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -131,7 +132,7 @@ def test_a_planted_threshold_that_a_power_law_follows_is_not_decided_against():
     (found,) = challenges_of([norton])
     assert found.kind == "threshold"
     assert found.subject == "norton above a threshold"
-    assert f"of {THRESHOLD * norton.reference.stress:.3g} MPa " in found.sentence
+    assert f"of {THRESHOLD * norton.reference.stress:.3g} MPa " in challenge_text(found)
 
 
 # ---- unmodelled effects ------------------------------------------------------------------------------------------
@@ -153,9 +154,9 @@ def test_what_rests_on_a_furnace_that_nobody_watched_is_not_decisive():
     (drift,) = (c for c in found.challenges if c.kind == "unmodelled effect")
     assert drift.subject == "temperature drift"
     size = r"with independent drifts of the temperature of up to ([\d.]+) K over each of the 3 tests"
-    said = re.fullmatch(rf"{size} time-hardening would explain them \(weight 0\.\d\d\)", drift.sentence)
+    said = re.fullmatch(rf"{size} time-hardening would explain them \(weight 0\.\d\d\)", challenge_text(drift))
     assert 0.0 < float(said[1]) < 5.0
-    assert drift.sentence in found.verdict
+    assert challenge_text(drift) in found.verdict
 
 
 # ---- example data ------------------------------------------------------------------------------------------------
@@ -223,10 +224,10 @@ def test_a_thickness_that_is_stated_too_large_in_all_tests_is_named_with_its_siz
     assert not found.decisive
     named = next(c for c in found.challenges if c.subject == "thickness")
     said = re.match(
-        r"with a thickness ([\d.]+) % smaller in each of the 2 tests (or .*)?norton .*would", named.sentence
+        r"with a thickness ([\d.]+) % smaller in each of the 2 tests (or .*)?norton .*would", challenge_text(named)
     )
     assert float(said[1]) == pytest.approx(100 * (1 - 1 / 1.05), abs=0.8)
-    assert named.sentence in found.verdict
+    assert challenge_text(named) in found.verdict
 
 
 def test_where_thicknesses_are_as_stated_none_is_named():
@@ -257,9 +258,9 @@ def test_sizes_of_errors_are_those_that_were_put_into_the_tests(steady_fits):
             values = residuals.values - planted_sizes.reshape(-1, 1) * effect.residual_change
             moved.append(replace(fit, linearised=replace(fit.linearised, residuals=replace(residuals, values=values))))
         effects = tuple(next(e for e in fit.unmodelled if e.kind == "offset of strain") for fit in fits)
-        text = Trial.of(moved, effects, scope).description(moved, 0)
-        largest = float(re.search(r"of (?:up to )?\+?([\d.e-]+) in the strain of each of the 3 tests", text)[1])
-        assert largest == pytest.approx(np.abs(planted_sizes).max() * effects[0].size, rel=0.1)
+        size = Trial.of(moved, effects, scope).size(moved, 0)
+        assert (size.tests, size.differs) == (3, scope == "test")
+        assert size.size == pytest.approx(np.abs(planted_sizes).max() * effects[0].size, rel=0.1)
 
 
 # ---- equivalence -----------------------------------------------------------------------------------------------------

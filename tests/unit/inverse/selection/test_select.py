@@ -14,7 +14,7 @@ from creepkit.inverse.evidence import occam_penalty
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.selection.challenges import Challenge
+from creepkit.inverse.selection.challenges import Challenge, PerturbationSize
 from creepkit.inverse.selection.discrimination import _nearest_of, same_function, under_common_covariance
 from creepkit.inverse.selection.ranking import RankedLaw, Ranking, _are_outdone, challenged, rank, ranking_from_scores
 from creepkit.inverse.selection.select import _repeated, _richer_laws, _with_fixed
@@ -197,8 +197,11 @@ LEFT = Adequacy(
     LargestDeviation("bar 1", "strain", 5400.0, 4e-5, 2.0),
 )  # fmt: skip
 UNKNOWN = Adequacy((), NAN, 0.0, NAN, NAN, None)
-SUM = Challenge("sum", "norton+sinh", "norton+sinh with 30 % of the rate from sinh explains them as well")
-DRIFT = Challenge("unmodelled effect", "temperature drift", "a temperature drift would leave it a weight of 0.52")
+SUM = Challenge("sum", "norton+sinh", other="sinh", size=0.3, excess=0.0)
+DRIFT = Challenge(
+    "unmodelled effect", "temperature drift", other="sinh", weights=(0.52, 0.48),
+    sizes=(PerturbationSize("temperature drift", 5.0, "K over a test"),),
+)  # fmt: skip
 
 
 def fit(name, adequacy=EXPLAINS, **more):
@@ -296,7 +299,8 @@ def test_an_export_of_a_ranking_carries_its_verdict():
     assert "decisive; weight" not in ck.export(found.best, "latex")
 
 
-THINNER = Challenge("unmodelled effect", "thickness", "with a thickness 4.8 % smaller sinh would explain them")
+THINNER = Challenge("unmodelled effect", "thickness", sizes=(PerturbationSize("thickness", -4.8, "%"),), laws=("sinh",))
+SMALLER = "with a thickness 4.8 % smaller sinh would explain them"
 NONE = "not decisive: none of {} laws tried explains the tests"
 APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh"
 SENTENCES = [
@@ -306,7 +310,7 @@ SENTENCES = [
         "stated noise) unexplained",
         "Most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
-    (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {THINNER}; the best is norton: it {EXPLAINS}"),
+    (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {SMALLER}; the best is norton: it {EXPLAINS}"),
 ]
 
 

@@ -14,15 +14,11 @@ from creepkit.errors import ArgumentError, FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.correlation import correlation, undetermined
-from creepkit.inverse.uncertainty.laplace_approximation import (
-    Estimate,
-    cut_interval_notes,
-    cut_intervals,
-    verdict_of_interval,
-)
+from creepkit.inverse.uncertainty.laplace_approximation import Estimate, cut_intervals, verdict_of_interval
 from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
+from creepkit.reports.remarks import remarks
 from helpers.log_rate_predictor import known_scatter, least_squares, measured
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -91,9 +87,10 @@ def test_an_interval_that_ends_at_a_bound_is_named(name: str, end: int) -> None:
     bound = NORTON.table[name].bounds[end]
     ends[name] = (bound, ends[name][1]) if end == 0 else (ends[name][0], bound)
     assert cut_intervals(NORTON, estimates(ends)) == {name: bound}
-    (sentence,) = cut_interval_notes(NORTON, estimates(ends))
+    assert cut_intervals(NORTON, estimates(ends, "not determined")) == {}
+    none = {"notes": (), "provenance": {}, "adequacy": None, "numerical_error": None, "unmodelled": ()}
+    (sentence,) = remarks(SimpleNamespace(law=NORTON, estimates=estimates(ends), **none))
     assert sentence.startswith(f"the interval of {name} ends at its bound, {bound:.4g}")
-    assert cut_interval_notes(NORTON, estimates(ends, "not determined")) == ()
 
 
 @pytest.mark.parametrize(
