@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 30_981
+TESTS = 30_990
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
