@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 6983,
+    "readers": 7008,
     "records": 2469,
     "registry": 615,
     "reports": 6694,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_000
+TESTS = 31_009
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

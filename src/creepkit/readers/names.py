@@ -34,6 +34,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "pressure": (*("druck", "prüfdruck", "innendruck", "pression"), *("pressione", "presión")),
     "strain": (
         *("hold strain", "held strain", "strain held", "total strain held", "imposed strain", "applied strain"),
+        *("deformazione imposta", "deformación impuesta"),
         *("creep", "total creep", "total creep strain", "dehnung", "axial strain", "tensile strain", "クリープひずみ"),
         *("zeitdehnung", "déformation", "allongement relatif", "deformation relative", "tensile strain extensometer"),
         *("deformazione", "deformación"),

@@ -85,6 +85,10 @@ class TestRow:
     is_open: bool = False
 
 
+_SEARCHED = 20
+"""Rows of another sheet within which its names are looked for."""
+
+
 _GROUPED = re.compile(r"\d{1,3}(?:\.\d{3})+,\d+|\d{1,3}(?:,\d{3})+\.\d+|\d{1,3}(?:[\s'’]\d{3})+(?:[.,]\d+)?(?![\d.,])")
 """A number with separators between thousands that cannot be a decimal sign."""
 
@@ -157,6 +161,29 @@ class TestTable:
         """The name of its test: that of its cell, else the sheet or the file and the line."""
         k = self.position("name")
         return (k is not None and row.cells[k]) or f"{self.table.sheet or self.table.path.stem} {row.line}"
+
+    def take_labels(self, other: CellTable) -> bool:
+        """Take the columns of another sheet, such as compositions, by test, heat or alloy; whether a row has them."""
+        for at, head in enumerate(other.rows[:_SEARCHED] if self.is_understood else ()):
+            keys = {column_called(cell).quantity or cell: k for k, cell in enumerate(head.cells) if cell}
+            shared = [(keys[one], self.position(one)) for one in ("name", "label heat", "alloy") if one in keys]
+            k, column = next(((k, own) for k, own in shared if own is not None), (0, None))
+            if column is None or len(keys) < 2:
+                continue
+            below = {row.cells[k]: row for row in other.rows[at + 1 :] if row.cells[k : k + 1] and row.cells[k]}
+            matching = [(row, below[row.cells[column]]) for row in self.rows if row.cells[column] in below]
+            for row, said in matching:
+                cells = zip(head.cells, said.cells, strict=False)
+                stated = {
+                    name: cell for n, (name, cell) in enumerate(cells) if n != k and name and not is_missing(cell)
+                }
+                labels = {f"label {name}": cell for name, cell in stated.items() if name not in self.names}
+                place = other.location(said.line)
+                row.stated = {**row.stated, **{one: SourceText(cell, place) for one, cell in labels.items()}}
+            if matching:
+                self.table = self.table.assuming(f"sheet '{other.sheet}' by its column '{head.cells[k]}'")
+                return True
+        return False
 
     def notes_of_rows(self) -> list[dict[str, SourceText]]:
         """The notes of each row as labels: those that name tests, or say that one does not count, are not of all."""

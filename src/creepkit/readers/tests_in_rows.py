@@ -146,10 +146,11 @@ class RowPerTestReader:
                 "as stress_MPa,temperature_C,rupture_h"
             )
         others = [table for table, head in found if head is None]
-        aside = [f"sheet '{other.sheet}' not read as it is no table of tests" for other in others]
-        heads = [(table.assuming(*aside), head) for table, head in found if head is not None]
+        heads = [(table, head) for table, head in found if head is not None]
         tables = [TestTable(table, head, self.vocabulary, errors) for table, head in heads]
         for one in tables:
+            unused = [other.sheet for other in others if not one.take_labels(other)]
+            one.table = one.table.assuming(*(f"sheet '{name}' not read as it is no table of tests" for name in unused))
             one.notes += filter(None, (only_text(row, other.dialect) for other in others for row in other.rows))
         return tables
 

@@ -219,3 +219,15 @@ def test_numbers_under_a_head_that_is_nearly_a_known_name_are_no_label(tmp_path)
         )
         with pytest.raises(HistoryError, match=near):
             ck.read_histories(tmp_path)
+
+
+def test_compositions_in_another_sheet_are_labels_of_the_tests(tmp_path):
+    """By alloy or by heat, below a title; what is of no test stays aside, and says so."""
+    for key in ("Alloy", "Heat"):
+        rates = [[key, "T (C)", "Stress (MPa)", "min rate (1/h)"], ["N1", 750, 200, 2e-4], ["N2", 750, 200, 6e-4]]
+        contents = [["Chemical composition, wt.%"], [key, "Cr", "Ni"], ["N1", 15, "bal"], ["N2", 18, "bal"]]
+        book = workbook(tmp_path / f"{key}.xlsx", {"Rates": rates, "Comp": contents, "Plan": [["to do"], ["next"]]})
+        tests = ck.read_histories(book)
+        assert [(one.labels["Cr"], one.labels["Ni"]) for one in tests] == [("15", "bal"), ("18", "bal")]
+        assert f"sheet 'Comp' by its column '{key}'" in tests[0].labels["assumed"]
+        assert "sheet 'Plan' not read" in tests[0].labels["assumed"]
