@@ -157,6 +157,21 @@ def test_damage_follows_its_closed_form_and_stays_at_its_limit(routines):
     assert found[0] > 0
 
 
+def test_a_state_that_falls_ends_at_its_limit(tmp_path, gfortran):
+    """w' = -B w from 1 to 0.1 and rate = A s^n/w: the strain is A s^n (exp(B t) - 1)/B until then."""
+    falls = {omega: State(1.0, -B * omega, limit=0.1)}
+    law = CreepLaw(
+        name="falls", terms={"term": A * stress**n / omega}, params={A: RATE, B: RATE, n: POWER}, states=falls
+    )
+    text = AbaqusCreepSubroutine().text(LawWithValues(law, {"A": 1e-16, "B": 1e-4, "n": 4.0}))
+    routine, inner = Routine(gfortran, text, tmp_path, "falls"), np.zeros(10)
+    found, _ = routine.creep(60.0, 0.0, 5e3, 5e3, states=inner)
+    assert found[0] == pytest.approx(1e-16 * 60.0**4 * np.expm1(0.5) / 1e-4, rel=5e-3)
+    assert 1.0 + inner[0] == pytest.approx(np.exp(-0.5), rel=5e-3)
+    routine.creep(60.0, found[0], 1e5, 9.5e4, states=inner)
+    assert 1.0 + inner[0] == pytest.approx(0.1, rel=1e-12)
+
+
 @pytest.mark.parametrize("folds", [1.0, 5.0, 40.0, 1e6])
 def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path, gfortran):
     """q' = B (q + c) and rate = q': from q = 0 the strain is c (exp(B t) - 1), at least c B t in any increment."""

@@ -310,7 +310,10 @@ class CreepSubroutine:
             "seconds": fortran_number(units.seconds),
             "stress": units.stress,
             "time": units.time,
-            "limits": "\n".join(f"        ends({k}) = {fortran_number(end)}" for k, end in enumerate(ends, 1)),
+            "limits": "\n".join(
+                f"        ends({k}) = {fortran_number(end)}\n        sides({k}) = {1 if end > start else -1}.0d0"
+                for k, (end, start) in enumerate(zip(ends, starts, strict=True), 1)
+            ),
             "initial": "\n".join(f"      initial({k}) = {fortran_number(v)}" for k, v in enumerate(starts, 1)),
             **self._state_statements(stem, len(states)),
         }

@@ -143,9 +143,10 @@ $placed      end subroutine ${id}_place
         double precision, intent(in) :: s, ds, point($np), stress, mean
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         double precision x($mx), out(ny*(1 + nx)), grown, h, ends(ny)
+        double precision sides(ny)
         integer i
         call ${id}_place(s, ds, point, stress, mean, x, h)
-        call ${id}_limits(ends)
+        call ${id}_limits(ends, sides)
         do i = 2, ny
           if (abs(ends(i)) < 1.0d300) y(i) = ends(i)
         enddo
@@ -184,8 +185,9 @@ $placed      end subroutine ${id}_place
         double precision, intent(in) :: out(ny*(1 + nx)), slope(ny, 2)
         double precision, intent(out) :: a(ny, ny), r(ny, 3)
         double precision g(ny), d(ny, nx), ends(ny), size, lnh
+        double precision sides(ny)
         integer i, j
-        call ${id}_limits(ends)
+        call ${id}_limits(ends, sides)
         lnh = log(h)
         g = out(1:ny)
         do i = 1, ny
@@ -208,7 +210,7 @@ $placed      end subroutine ${id}_place
           a(i, i) = 1.0d0 + a(i, i)
           r(i, 1) = y(i) + h*g(i) - z(i)
           r(i, 2:3) = r(i, 2:3) + slope(i, :)
-          if (y(i) >= ends(i)) then
+          if (sides(i)*(y(i) - ends(i)) >= 0.0d0) then
             a(i, :) = 0.0d0
             a(i, i) = 1.0d0
             r(i, :) = 0.0d0
@@ -227,20 +229,21 @@ $placed      end subroutine ${id}_place
         implicit none
         integer, parameter :: ny = $ny
         double precision, intent(inout) :: y(ny), slope(ny, 2)
-        double precision ends(ny)
+        double precision ends(ny), sides(ny)
         integer i
-        call ${id}_limits(ends)
+        call ${id}_limits(ends, sides)
         do i = 2, ny
-          if (y(i) >= ends(i)) then
+          if (sides(i)*(y(i) - ends(i)) >= 0.0d0) then
             y(i) = ends(i)
             slope(i, :) = 0.0d0
           endif
         enddo
       end subroutine ${id}_hold
+! Where the material has failed, and whether above (1) or below (-1).
 !
-      subroutine ${id}_limits(ends)
+      subroutine ${id}_limits(ends, sides)
         implicit none
-        double precision, intent(out) :: ends($ny)
+        double precision, intent(out) :: ends($ny), sides($ny)
 $limits
       end subroutine ${id}_limits
 !
