@@ -1,6 +1,6 @@
 """Exported stress updates run by CalculiX as UMAT, beside creepkit's own solver.
 
-    python tests/benchmarks/verify_umat.py [LAW ...] [--longest 600 300] [--write]
+    python tests/benchmarks/verify_umat.py [LAW ...] [--longest 150 75] [--write]
 
 Each law is exported with `ck.export(law, "calculix-umat")`, compiled by gfortran and preloaded before CalculiX 2.20,
 built from Debian's source, as material ABAQUSNL..., for which CalculiX forms logarithmic strains, or ABAQUS... in the
@@ -77,7 +77,7 @@ def cells(name: str, specimen: str, longest: list[float], program: Path, folder:
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("laws", nargs="*", default=list(LAWS), help="some of: " + ", ".join(LAWS))
-    parser.add_argument("--longest", nargs=2, type=float, default=[600.0, 300.0])
+    parser.add_argument("--longest", nargs=2, type=float, default=[150.0, 75.0])
     parser.add_argument("--specimens", nargs="*", default=["one element", "dimple"])
     options = parser.parse_args()
     longest = sorted(options.longest, reverse=True)

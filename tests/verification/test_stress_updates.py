@@ -7,6 +7,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import ExportError
 from creepkit.exporters.user_materials import TARGETS, NumpyUpdate
+from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.records import LawWithValues, Units
 from creepkit.registry import default_registry
 from helpers.stress_updates import (
@@ -132,9 +133,9 @@ def relaxed(m, count, updates, *, units=None, scale=(1.0, 1.0)):
     source = LawWithValues(
         ck.law(law), {"A": 1e-14, "n": 4.0, **values}, elastic=ck.Elastic(150e3), units=units or Units()
     )
-    stress = np.array([0.0, 0, 0, 200.0 / np.sqrt(3.0), 0, 0]) / scale[0]
+    shear = np.array([0.0, 0, 0, 200.0 / np.sqrt(3.0), 0, 0]) / scale[0]
     held = Path6(np.array([0.0, 1e5]) / scale[1], np.zeros((2, 6)), np.full(2, 1000.0))
-    found = driven(updates(source), held, Point(stress, np.zeros(1)), count)
+    found = driven(updates(source), held, Point(shear, np.zeros(1)), count)
     return np.sqrt(3.0) * found.stress[3] * scale[0]
 
 
@@ -167,14 +168,35 @@ def test_damage_under_stretching_fades_away_with_the_stress_and_ends_at_its_limi
     """
     values = dict(A=1e-12, n=3.0, B=6e-14, chi=4.0, phi=3.0, alpha=0.0, m=0.0)
     source = LawWithValues(LAWS["kachanov-rabotnov"], values, elastic=ck.Elastic(150e3))
-    life, stress = 1.0 / (6e-14 * 100.0**4), 100.0 * np.array([2.0, -1.0, -1.0, 0, 0, 0]) / 3.0
+    life, pull = 1.0 / (6e-14 * 100.0**4), 100.0 * np.array([2.0, -1.0, -1.0, 0, 0, 0]) / 3.0
     for lives in (1.5, 30.0):
         pulled = lives * life * 1e-6 * np.array([1.0, -0.5, -0.5, 0, 0, 0])
         path = Path6(np.array([0.0, lives * life]), np.array([np.zeros(6), pulled]), np.full(2, 1000.0))
-        found = driven(updates(source), path, Point(stress, np.zeros(2)), count)
+        found = driven(updates(source), path, Point(pull, np.zeros(2)), count)
         assert found.state[0] == pytest.approx(pulled[0], rel=1e-2)
         assert found.state[1] == pytest.approx(min(1 - np.exp(-lives), 0.99999999), rel=1e-3)
         assert found.stress[0] == pytest.approx(200.0 / 3.0 * np.exp(-lives / 4), rel=1e-2, abs=1.0)
+
+
+def test_a_state_that_falls_ends_at_its_limit_whatever_names_a_law_has(updates, tmp_path, gfortran):
+    """w' = -NY w from 1 to its limit at 0.1: exp(-NY t); the names are those of the algorithm, or of functions."""
+    A, NY, x, kelvin = parameters("A NY x kelvin")
+    (stage,) = states("stage")
+    rate, number = Param("rate", (1e-30, 1e-3), "1/s", "log"), Param("number", (0.5, 8))
+    law = CreepLaw(
+        name="update",
+        terms={"law": A * stress**x * kelvin / stage},
+        params={A: rate, NY: rate, x: number, kelvin: number},
+        states={stage: State(1.0, -NY * stage, limit=0.1)},
+    )
+    source = LawWithValues(law, dict(A=1e-20, NY=1e-4, x=3.0, kelvin=1.0), elastic=STEEL)
+    routine = FortranUpdate(gfortran, EXPORTERS["abaqus-umat"].text(source), tmp_path, "abaqus-umat")
+    assert routine.warnings == ""
+    for update in (updates(source), routine, NumpyUpdates(NumpyUpdate().text(source))):
+        for end, expected in ((1e4, np.exp(-1.0)), (1e5, 0.1)):
+            still = Path6(np.array([0.0, end]), np.zeros((2, 6)), np.full(2, 900.0))
+            found = driven(update, still, Point(np.array([50.0, 0, 0, 0, 0, 0]), np.zeros(2)), 2)
+            assert 1.0 + found.state[1] == pytest.approx(expected, rel=1e-3)
 
 
 def test_no_time_is_elastic(updates):

@@ -281,7 +281,7 @@ class CreepSubroutine:
         if law.uses(principal_stress):
             raise ExportError(
                 f"law '{law.name}' needs the largest principal stress, which {self.solver} does not pass to "
-                "CREEP; export it as 'mfront', or choose a law of the von Mises stress"
+                f"CREEP; export it as '{self.name}-umat' or 'mfront', or choose a law of the von Mises stress"
             )
 
     def _state_statements(self, stem: str, count: int) -> dict[str, str]:
@@ -382,7 +382,8 @@ class CalculixCreepSubroutine(CreepSubroutine):
         refuse_conditions(law, "CREEP of CalculiX, which is given no fields,")
         if law.uses(mean_stress):
             raise ExportError(
-                f"law '{law.name}' needs the mean stress, which CalculiX does not pass to CREEP; export it as 'mfront'"
+                f"law '{law.name}' needs the mean stress, which CalculiX does not pass to CREEP; export it as "
+                "'calculix-umat'"
             )
 
     def _state_statements(self, stem: str, count: int) -> dict[str, str]:

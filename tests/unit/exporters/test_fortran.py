@@ -199,7 +199,7 @@ def test_what_creep_is_not_told_is_refused():
         AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
     mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
     assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
-    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass.*export it as 'mfront'"):
+    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass.*export it as 'calculix-umat'"):
         CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
     shared = law(A * (a * principal_stress + (1 - a) * stress) ** n, {A: RATE, n: POWER, a: Param("share", (0, 1))})
     text = AbaqusCreepSubroutine().text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
