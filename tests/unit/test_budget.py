@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1143,
-    "readers": 7008,
+    "readers": 7009,
     "records": 2469,
     "registry": 615,
     "reports": 6694,

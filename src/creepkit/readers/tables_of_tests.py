@@ -126,6 +126,7 @@ class TestTable:
         self, sheet: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, errors: list[HistoryError]
     ) -> None:
         self.vocabulary, self.errors = vocabulary, errors
+        self.table: CellTable = sheet
         self.notes: list[str] = []
         self.rows: list[TestRow] = []
         self._read(sheet, head)
