@@ -7,6 +7,7 @@ for damage, tests over a range of stresses for an exponent that changes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from scipy import stats
@@ -15,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, LawError
 from creepkit.inverse.compared_tests import testable_laws
-from creepkit.inverse.minimum_rates import measured_minimum_rate
+from creepkit.inverse.minimum_rates import apparent_exponent, measured_minimum_rate
 from creepkit.inverse.reference_conditions import (
     ISOTHERMAL_RANGE,
     reference_condition,
@@ -40,6 +41,10 @@ THRESHOLDS, CHANCE = np.linspace(0.0, 0.96, 25), 0.05
 costs a fit, one too few the answer."""
 
 
+USUAL_EXPONENT = 5.0
+"""Of stress, of metals that creep by climb of dislocations."""
+
+
 FEWEST_RUPTURES = 4
 """Of tests without curves, from which damage can be identified beside minimum rates."""
 
@@ -52,7 +57,8 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     minimum rates prefer them a threshold stress, constant or linear in temperature, or a sum of two powers, each with
     an activation energy; with primary creep where a third of the curves show it, with and without where a third relax,
     and logarithmic creep where a third of them go with ln t, else beside hardening by strain and by time. Where a third
-    of the curves show tertiary creep, or where a table states rupture times, laws with damage are added.
+    of the curves show tertiary creep, more than loss of section under a constant load explains, or where a table states
+    rupture times, laws with damage are added.
     """
     return list(named_candidates(histories).values())
 
@@ -68,7 +74,7 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
     if 2 * len(curves) < len(tests):
         ruptures = sum(h.rupture_time is not None for h in tests if not h.outputs) >= FEWEST_RUPTURES
         names = [*steady, *(["kachanov-rabotnov", *(["sinh-damage"] if several else [])] if ruptures else [])]
-    elif _share(curves, shows_tertiary_creep) > SHARE:
+    elif _share(curves, partial(shows_tertiary_creep, exponent=measured_exponent(tests))) > SHARE:
         names = [*steady[:1], *steady[2:], "mpc-omega", "kachanov-rabotnov", *(["sinh-damage"] if several else [])]
     elif _share(curves, _relaxes) > SHARE:
         names = [*steady, *(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening"]
@@ -89,12 +95,24 @@ def _several_stresses(tests: Sequence[History]) -> bool:
     return len(distinct) >= FEWEST_STRESSES and distinct[-1] >= STRESS_RATIO * distinct[0]
 
 
-def laws_of_changing_exponent(tests: Sequence[History]) -> list[str]:
-    """Names of the laws that minimum rates prefer to Norton's, as ln rate over ln stress bends up or down."""
+def _measured_rates(tests: Sequence[History]) -> Floats:
+    """(3, tests) stress, MPa, temperature, K, and minimum rate, 1/s, of the tests that show one."""
     points = np.array(
         [(*reference_condition(h), measured_minimum_rate(h)) for h in tests if h.loading.quantity == "stress"]
     ).reshape(-1, 3)
-    stress, temperature, rate = points[np.isfinite(points).all(axis=1)].T
+    return np.asarray(points[np.isfinite(points).all(axis=1)].T)
+
+
+def measured_exponent(tests: Sequence[History]) -> float:
+    """Stress exponent of the minimum rates of tests; USUAL_EXPONENT where they do not show it."""
+    stress, temperature, rate = _measured_rates(tests)
+    exponent = apparent_exponent(stress, rate, temperature)[0] if stress.size > 1 else np.nan
+    return max(exponent, 0.0) if np.isfinite(exponent) else USUAL_EXPONENT
+
+
+def laws_of_changing_exponent(tests: Sequence[History]) -> list[str]:
+    """Names of the laws that minimum rates prefer to Norton's, as ln rate over ln stress bends up or down."""
+    stress, temperature, rate = _measured_rates(tests)
     if stress.size == 0:
         return []
     several = float(np.ptp(temperature)) > ISOTHERMAL_RANGE

@@ -21,6 +21,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.limits import SIGNIFICANCE
 from creepkit.quality.frames import block_means, load_segments
 from creepkit.records import History, growing_output
+from creepkit.records.loading import held_of
 from creepkit.records.reading_noise import noise_of_readings
 
 LEAST_RISE = 1.5
@@ -37,6 +38,10 @@ PARTS_OF_STRAIN = tuple((0.0, end) for end in (1.0, 0.5, 0.3, 0.15, 0.08, 0.04))
 
 CLEAR = 20.0
 """Standard deviations of a reading that the output grows in a part at least, where time is judged over the output."""
+
+
+LARGEST_STRAIN = 2.0
+"""Up to which loss of section is taken into account; beyond it readings are none."""
 
 
 STEEP, LAST_FRAMES = 2.0, 5
@@ -59,12 +64,20 @@ MOST_MEANS = 25
 """Means over neighbouring frames of a part: what is correlated over shorter times is then nearly independent."""
 
 
-def shows_tertiary_creep(history: History) -> bool:
-    """Whether the rate of the output that grows rises under the last load by LEAST_RISE and by more than noise."""
+def shows_tertiary_creep(history: History, exponent: float = 0.0) -> bool:
+    """Whether the rate of the output that grows rises under the last load by LEAST_RISE and by more than noise.
+
+    exponent : of stress, where it is known: under a constant load the true stress grows as exp(strain), and the rate
+    as exp(exponent strain), which is no tertiary creep of the material.
+    """
     segments = load_segments(history)
     if not segments or not segments[-1].load_increased:
         return False
     times, values = _curve(history, segments[-1].frames)
+    if exponent > 0.0 and history.loading.quantity == "stress" and held_of(history.loading) == "load":
+        values = np.log1p(values) if history.strain_measure == "engineering" else values
+        speed = np.exp(exponent * np.clip(values, 0.0, LARGEST_STRAIN))
+        times = times[0] + np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(times)))
     return bool(np.ptp(times) > 0 and values[-1] >= values[0] and _rises_in_a_part(times, values, PARTS))
 
 

@@ -14,7 +14,7 @@ from textwrap import wrap
 from typing import Any
 
 from creepkit.errors import CreepkitError, StudyError
-from creepkit.inverse.candidates import named_candidates
+from creepkit.inverse.candidates import measured_exponent, named_candidates
 from creepkit.inverse.compared_tests import duration_known, followed_duration
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.quality import FRAME_FLAG_KINDS, DataQuality
@@ -277,6 +277,7 @@ class DataSummary:
         for temperature in sorted(value for history in tests for value in held_temperatures(history)):
             if not levels or temperature > levels[-1] + ISOTHERMAL_RANGE:
                 levels.append(temperature)
+        exponent = measured_exponent(tests)
         return cls(
             tuple(tests),
             tuple(sorted({round(float(v), 6) for h in tests for v in _held_levels(h)})),
@@ -284,7 +285,7 @@ class DataSummary:
             tuple(dict.fromkeys(h.alloy for h in tests if h.alloy)),
             tuple(dict.fromkeys(h.labels["heat"] for h in tests if h.labels.get("heat"))),
             sum(history.rupture_time is not None for history in tests),
-            sum(shows_tertiary_creep(history) for history in tests),
+            sum(shows_tertiary_creep(history, exponent) for history in tests),
         )
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.inverse.candidates import measured_exponent
 from creepkit.quality import check_data_quality, repeated_row_notes, without_copies
 from creepkit.quality.curve_shapes import falls_logarithmically, shows_primary_creep, shows_tertiary_creep
 from creepkit.quality.repeats import agreement_by_chance, copied_tests, repeated_rows
@@ -77,6 +78,25 @@ def test_measured_tests_to_rupture_show_tertiary_creep(folder):
     tests = [h for h in ck.read_histories([SHARED / "uniaxial" / folder]) if h.rupture_time is not None and h.outputs]
     assert tests
     assert all(shows_tertiary_creep(history) for history in tests)
+    assert np.mean([shows_tertiary_creep(history, measured_exponent(tests)) for history in tests]) > 0.9
+
+
+def thinned(stress, exponent, control="load"):
+    """Norton's law to 12 % of strain: under a constant load t = (1 - exp(-n e)) / (n A stress^n)."""
+    strain = np.linspace(0.0, 0.12, 50)
+    speed = 1e-6 * (stress / 50.0) ** exponent
+    times = strain / speed if control == "stress" else -np.expm1(-exponent * strain) / (exponent * speed)
+    noise = 2e-5 * np.random.default_rng(int(stress)).standard_normal(50)
+    return ck.History(f"{stress:g}", times, {"strain": strain + noise}, StressSteps(((0.0, stress),), control), 1100.0)
+
+
+@pytest.mark.parametrize("exponent", [5.0, 9.0])
+def test_loss_of_section_under_a_constant_load_is_no_tertiary_creep(exponent):
+    tests = [thinned(stress, exponent) for stress in (40.0, 50.0, 65.0)]
+    assert all(shows_tertiary_creep(one) for one in tests)
+    assert not any(shows_tertiary_creep(one, measured_exponent(tests)) for one in tests)
+    assert not any(shows_tertiary_creep(thinned(stress, exponent, "stress")) for stress in (40.0, 65.0))
+    assert {"norton", "hyperbolic-sine"} <= {law.name for law in ck.candidates(tests)}
 
 
 def test_primary_creep_is_seen_where_the_rate_falls_and_not_in_noise():
