@@ -81,6 +81,10 @@ MOST_TESTS = 3
 """That may be named one after the other."""
 
 
+OF_READING = ("assumed", "suspect", "cut at strain", "loading_strain", "frames_after_end")
+"""Labels that say how a test was read and checked, by which tests are no groups."""
+
+
 NAMES = re.compile(
     r"(?<![a-z])(?:alloy|heat|lab\w*|rig|machine|furnace|batch|charge|lot|schmelze|ofen|maschine|coul[eé]e)"
     r"(?:s|n)?(?:[ _-]*(?:no|nr|number|nummer|id|code)\b.*|\W*)$",
@@ -360,12 +364,13 @@ class RateExplanations:
     def _stated_groups(self) -> dict[tuple[str, str], Bools]:
         """{(what they are, what the others are): which tests}, of groups that the tests state: alloy, heat, rig.
 
-        The others are "" where they are of several or not all of them state it. A label of numbers is a quantity.
+        The others are "" where they are of several or not all of them state it. A label of numbers is a quantity, and
+        what readers and checks of data write is none of the laboratory's.
         """
         histories, groups = self.problem.histories, dict[tuple[str, str], Bools]()
         for key in dict.fromkeys(["alloy", *(key for h in histories for key in h.labels)]):
             entries = [h.alloy if key == "alloy" else h.labels.get(key, "") for h in histories]
-            if are_numbers(key, entries):
+            if key in OF_READING or are_numbers(key, entries):
                 continue
             for entry in dict.fromkeys(entries):
                 group = np.array([one == entry for one in entries])

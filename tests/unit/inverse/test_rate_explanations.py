@@ -106,6 +106,12 @@ def test_a_label_that_splits_the_tests_as_their_rates_do_is_named_with_the_facto
     assert "identify each heat apart" in str(fit)
 
 
+def test_how_tests_were_read_is_no_group():
+    tests = bars(power_law(5.0, 4e5), factor=dict.fromkeys(range(0, len(STEEL), 2), 3.0))
+    read = [h.replace(labels={"assumed": "a ramp, " * (k % 2) + "a plain bar"}) for k, h in enumerate(tests)]
+    assert all(not one.label for one in fitted(read).adequacy.explanations)
+
+
 def test_two_groups_are_found_where_least_squares_bend_the_primary_creep_of_the_law_towards_them():
     other = (0, 3, 5, 6, 9)
     fit = fitted(with_primary(bars(power_law(5.0, 4e5), factor=dict.fromkeys(other, 4.0)), 1), "norton*primary")
