@@ -30,29 +30,29 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 779,
-    "inverse": 9402,
+    "inverse": 9412,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1143,
-    "readers": 7009,
+    "quality": 1150,
+    "readers": 7021,
     "records": 2469,
     "registry": 615,
-    "reports": 6694,
+    "reports": 6699,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2785,
+    "studies": 2786,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_021
+TESTS = 31_056
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

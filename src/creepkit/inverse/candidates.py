@@ -97,9 +97,8 @@ def _several_stresses(tests: Sequence[History]) -> bool:
 
 def _measured_rates(tests: Sequence[History]) -> Floats:
     """(3, tests) stress, MPa, temperature, K, and minimum rate, 1/s, of the tests that show one."""
-    points = np.array(
-        [(*reference_condition(h), measured_minimum_rate(h)) for h in tests if h.loading.quantity == "stress"]
-    ).reshape(-1, 3)
+    known = [h for h in tests if h.loading.quantity == "stress" and (h.outputs or h.minimum_rate is not None)]
+    points = np.array([(*reference_condition(h), measured_minimum_rate(h)) for h in known]).reshape(-1, 3)
     return np.asarray(points[np.isfinite(points).all(axis=1)].T)
 
 

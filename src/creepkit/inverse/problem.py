@@ -186,7 +186,7 @@ class LeastSquaresProblem:
         return [simulated_stresses(self.law, values, h, self.predictor) for h in self.histories]
 
     def with_stresses(self, stresses: Sequence[Floats]) -> LeastSquaresProblem:
-        """The same with the stresses that each test goes through, (stresses,) MPa."""
+        """The same with other stresses; stresses : (stresses,) MPa that each test goes through."""
         return replace(self, conditions=np.array([*map(condition_at, stresses, self.histories)]).T)
 
     def with_law(self, law: CreepLaw) -> LeastSquaresProblem:

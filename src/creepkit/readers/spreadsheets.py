@@ -101,21 +101,26 @@ def read_sheets(path: Path) -> list[CellTable]:
 class _SheetNotes:
     """What openpyxl does not say of a sheet that it reads row by row.
 
-    hidden : numbers of rows. hidden_columns : whether there are some. uncomputed : the first cell with a formula and no
-    value, "" for none. merged : first row and column, last row and column of each range of merged cells, from 1.
-    comments : {cell: text}.
+    hidden, struck : numbers of rows that are hidden, or struck through. hidden_columns : whether there are some.
+    uncomputed : the first cell with a formula and no value, "" for none. merged : first row and column, last row and
+    column of each range of merged cells, from 1. comments : {cell: text}.
     """
 
     hidden: list[str] = field(default_factory=list)
+    struck: list[str] = field(default_factory=list)
     hidden_columns: bool = False
     uncomputed: str = ""
     merged: list[tuple[int, int, int, int]] = field(default_factory=list)
     comments: dict[str, str] = field(default_factory=dict)
 
     def remarks(self, sheet: str) -> list[str]:
-        """What was hidden and read nevertheless, for the label "assumed"."""
-        shown = " ".join(self.hidden[:5]) + (" ..." if len(self.hidden) > 5 else "")
-        rows = [f"hidden rows of sheet '{sheet}' read too: {shown}"] if self.hidden else []
+        """What was hidden and read nevertheless, and what was struck through and not, for the label "assumed"."""
+        found = (("hidden rows", self.hidden, "read too"), ("rows struck through", self.struck, "not read"))
+        rows = [
+            f"{what} of sheet '{sheet}' {how}: {' '.join(rows[:5])}{' ...' * (len(rows) > 5)}"
+            for what, rows, how in found
+            if rows
+        ]
         return [*rows, *([f"hidden columns of sheet '{sheet}' read too"] if self.hidden_columns else [])]
 
 
@@ -162,13 +167,16 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
 
     aside : what was left aside of the file. first_day : from which its dates count.
     """
-    table = CellTable(path, [], str(sheet.title), Dialect("\t"), assumptions=(*notes.remarks(sheet.title), *aside))
+    table = CellTable(path, [], str(sheet.title), Dialect("\t"))
     if notes.uncomputed:
         what = "a formula without a computed value; save the file in a spreadsheet program, or paste the values"
         raise HistoryError(f"{table.place}, cell {notes.uncomputed}: {what}")
     rows, comments, texts, known = list[TableRow](), list[TableRow](), set[str](), dict[str, str]()
     sheet.reset_dimensions()
     for number, row in enumerate(sheet.iter_rows(), 1):
+        if _is_struck(row):
+            notes.struck.append(str(number))
+            continue
         cells = [_cell_text(cell, known, first_day) for cell in row]
         refuse_unprintable("".join(cells), partial(str.format, "{}, row {}", table.place, number))
         if any(cells):
@@ -177,6 +185,7 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
                 text for text, cell in zip(cells, row, strict=True) if "," in text and isinstance(cell.value, str)
             }
             (comments if is_comment(cells[0]) else rows).append(TableRow(number, cells))
+    table = replace(table, assumptions=(*notes.remarks(sheet.title), *aside))
     if not rows and not comments:
         return None
     if not rows:
@@ -188,6 +197,12 @@ def _table(path: Path, sheet: Any, notes: _SheetNotes, aside: Sequence[str], fir
     filled = _with_merged(_with_points(table, rows, texts, decimal), notes.merged)
     table = replace(table, rows=filled, header={**table.header, **header}, merged=merged)
     return in_plain_numbers(table, is_stated=bool(decimal))
+
+
+def _is_struck(row: Sequence[Any]) -> bool:
+    """Whether somebody has struck out all that stands in a row."""
+    written = [cell for cell in row if cell.value is not None]
+    return bool(written) and all(cell.font.strike for cell in written)
 
 
 # ---- cells ---------------------------------------------------------------------------------------------------------

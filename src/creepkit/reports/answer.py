@@ -272,8 +272,8 @@ def answer(
     further tests, whose first is what to do next. page : picture and files.
     """
     symbols = symbols_of(fit.law)
-    remarks = [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
-    remarks += [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), same_functions(ranking)]
+    remarks = [] if ranking is None or len(ranking.laws) < 2 else [chosen_text(ranking), same_functions(ranking)]
+    remarks += [] if ranking is None else [f"left out: {law}: {why}" for law, why in ranking.failed.items()]
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name == "stress exponent"), math.nan)

@@ -352,13 +352,18 @@ def _lines(block: Block) -> list[str]:
 def _answer_lines(answer: Answer) -> list[str]:
     """MOST_LINES lines, none longer than WIDTH; cautions, figures and remarks without room stand in the details.
 
-    So do the intervals of values where they would leave no room for one figure.
+    So do mean misfits, and then the intervals of values, where they would leave no room for one figure and one remark.
     """
     figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
-    head = _indented(f"{answer.headline} ({answer.tests})" if answer.tests else answer.headline, "")
     end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
-    for intervals in (True, False):
+    tests, _, misfits = answer.tests.partition("; ")
+    for intervals, said_of_tests, kept in (
+        *(((True, answer.tests, 1),) if misfits else ()),
+        *((one, tests, 1) for one in (True, False)),
+        *((one, tests, 0) for one in (True, False)),
+    ):
+        head = _indented(f"{answer.headline} ({said_of_tests})" if said_of_tests else answer.headline, "")
         pieces = [
             " ".join([f"{name} {value}", *[f"[{', '.join(ends)}]"] * intervals, unit]).strip().replace(" ", "\u00a0")
             for name, value, ends, unit in answer.values
@@ -368,7 +373,7 @@ def _answer_lines(answer: Answer) -> list[str]:
         law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
         said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
         remarks = [*map(_indented, answer.remarks)]
-        for parts, least in ((warned, 1), (said, 1), (remarks, 0), *[(said, 0)] * (not intervals)):
+        for parts, least in ((warned, 1), (said, 1), (remarks, kept), *[(said, 0)] * (not intervals)):
             while len(parts) > least and sum(map(len, (head, *remarks, law, *said, *warned, end))) > MOST_LINES:
                 parts.pop()
         lines = [*head, *chain(*remarks), *law, *chain(*said, *warned), *end]

@@ -316,7 +316,8 @@ def test_no_title_sets_the_encoding_of_a_file_for_code_aster(title):
 
 
 PROGRAMS = {"c", "javascript", "abaqus", "calculix", "mfront", "python", "numpy"}
-ELSEWHERE = PROGRAMS | {"latex", "markdown", "mathml", "json", "calculix-cards"}
+UPDATES = {"c-update", "numpy-update", "abaqus-umat", "calculix-umat", "ansys-usermat", "ls-dyna-umat"}
+ELSEWHERE = PROGRAMS | UPDATES | {"latex", "markdown", "mathml", "json", "calculix-cards"}
 """Targets judged over all laws by tests of their own; the others are cards, which are read here."""
 
 

@@ -431,7 +431,9 @@ def test_exponent_and_energy_are_those_of_equal_times_of_a_law_of_time_and_over_
     assert state.exponent[1] < N / (1 + M) < state.exponent[2]
     reached = (r.strain * (1 + M) / (A * r.stress**N * boltzmann(r.temperature))) ** (1 / (1 + M))
     assert [state.time[0], state.rate[0]] == pytest.approx([reached, (1 + M) * r.strain / reached], rel=0.02)
-    assert ("at constant time the law's formula has the stress" in fit.details()) == (name == "time-hardening")
+    assert ("at constant time the slope of the law's formula over stress is" in fit.details()) == (
+        name == "time-hardening"
+    )
 
 
 # ---- rates and durations ---------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from openpyxl.styles import Font
 
 import creepkit as ck
 from creepkit.errors import HistoryError
@@ -178,6 +179,19 @@ def test_what_is_hidden_is_told(tmp_path: Path):
     rows = [["Test", "Stress (MPa)", "T (C)", "t_r (h)"], *([f"A{k}", 60, 850, 100] for k in range(5))]
     table = workbook(tmp_path / "x.xlsx", {"S": rows}, hidden)
     assert "hidden rows of sheet 'S' read too: 5" in TEST_TABLE.read(table)[1].labels["assumed"]
+
+
+def test_a_row_that_is_struck_through_is_left_out_and_told(tmp_path: Path):
+    def struck(sheet):
+        for cell in sheet[3]:
+            cell.font = Font(strike=True)
+        sheet["A4"].font = Font(strike=True)  # a name alone
+
+    rows = [["test", "stress (MPa)", "T (°C)", "minimum creep rate (1/s)"]]
+    rows += [[f"A{k}", 100 + 10 * k, 600, 1e-9 * 2**k] for k in range(4)]
+    tests = ck.read_histories(workbook(tmp_path / "x.xlsx", {"S": rows}, struck))
+    assert [one.name for one in tests] == ["A0", "A2", "A3"]
+    assert all("rows struck through of sheet 'S' not read: 3" in one.labels["assumed"] for one in tests)
 
 
 @pytest.mark.parametrize(
