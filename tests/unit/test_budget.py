@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 779,
-    "inverse": 9424,
+    "inverse": 9425,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_056
+TESTS = 31_061
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
