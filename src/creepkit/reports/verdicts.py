@@ -24,7 +24,7 @@ from creepkit.reports.remarks import challenge_text, nuisance_text
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
     from creepkit.inverse.explanation import Explanation
-    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
     from creepkit.inverse.single_values import ContradictingValues
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
@@ -383,6 +383,15 @@ def _of_best(ranking: Ranking) -> str:
     return "whether the tests reject it is not known" if found is None else f"it {adequacy_text(found)}"
 
 
+def _with_errors(laws: Sequence[RankedLaw]) -> str:
+    """Which of them would explain the tests with an error that nobody modelled, as the end of a clause; or ""."""
+    for ranked in laws:
+        if ranked.fit.adequacy is not None and ranked.fit.adequacy.remedies:
+            errors = " or ".join(one.description for one in ranked.fit.adequacy.remedies)
+            return f"; with {errors}, which nobody modelled, {ranked.fit.law.name} would explain them"
+    return ""
+
+
 def _reason(ranking: Ranking) -> str:
     """Why a ranking of several laws is not decisive."""
     names, best, unmet = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, ranking.unmet
@@ -395,11 +404,7 @@ def _reason(ranking: Ranking) -> str:
             first = cause_headline(adequacy.explanations[0])
             return f"{tried} {best} is best ({weight}), but {first}: {explanation_text(adequacy)}"
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
-        remedied = [(r.fit.law.name, a.remedies) for r in ranking.laws if (a := r.fit.adequacy) and a.remedies]
-        if remedied and not named and not adequacy.remedies:
-            law, remedies = remedied[0]
-            effects = " or ".join(one.description for one in remedies)
-            others += f"; with {effects}, which nobody modelled, {law} would explain them"
+        others += _with_errors(ranking.laws) if not named and not adequacy.remedies else ""
         none = f"none {tried} explains the tests{f' as they are stated; {named}' if named else ''}"
         return f"{none}. The best, {best} ({weight}{others}), {adequacy_text(adequacy)}"
     if "asked" in unmet and adequacy is not None and adequacy.explains:
@@ -407,7 +412,8 @@ def _reason(ranking: Ranking) -> str:
         asked = len(ranking.laws) - more
         found = f"of {more} more that were tried, {best} is not rejected by them ({weight})"
         none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
-        return f"{none} the tests; {found}: plan tests that can refute it"
+        errors = _with_errors([ranked for ranked in ranking.laws if ranked.fit.law.name not in ranking.further])
+        return f"{none} the tests{errors}; {found}: plan tests that can refute it"
     if len(names) > 1:
         found = f"{f'{named}; ' if named else ''}the best is {best}: {_of_best(ranking)}{lost}"
         return f"{tried} these tests cannot tell apart {' and '.join(names)}; {found}"
