@@ -231,7 +231,8 @@ def adequacy_text(found: Adequacy) -> str:
         return f"is rejected by the rates of the tests: {explanation_text(found)}{curves}"
     where = f". Most in {_largest(found.largest)}" if found.largest is not None else ""
     if found.remedies and not found.explanations:
-        where += f". It would explain them with {' or with '.join(found.remedies)}, which nobody modelled"
+        effects = " or with ".join(one.description for one in found.remedies)
+        where += f". It would explain them with {effects}, which nobody modelled"
     rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained: {_chi_square(found)}, {_p_value(found)}"
     beside = f"; {'of its rates, ' * (not found.is_explained)}{explanation_text(found)}" if found.explanations else ""
     return f"{rest}{where}{beside}"
@@ -396,8 +397,9 @@ def _reason(ranking: Ranking) -> str:
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
         remedied = [(r.fit.law.name, a.remedies) for r in ranking.laws if (a := r.fit.adequacy) and a.remedies]
         if remedied and not named and not adequacy.remedies:
-            law, effects = remedied[0]
-            others += f"; with {' or '.join(effects)}, which nobody modelled, {law} would explain them"
+            law, remedies = remedied[0]
+            effects = " or ".join(one.description for one in remedies)
+            others += f"; with {effects}, which nobody modelled, {law} would explain them"
         none = f"none {tried} explains the tests{f' as they are stated; {named}' if named else ''}"
         return f"{none}. The best, {best} ({weight}{others}), {adequacy_text(adequacy)}"
     if "asked" in unmet and adequacy is not None and adequacy.explains:
