@@ -21,16 +21,16 @@ BUDGET = {
     "composition": 411,
     "core": 67,
     "dataset": 713,
-    "discovery": 1388,
+    "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3335,
+    "exporters": 3328,
     "extraction": 1289,
     "fem": 1440,
     "files": 1301,
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 779,
-    "inverse": 9425,
+    "inverse": 9435,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,18 +41,18 @@ BUDGET = {
     "readers": 7021,
     "records": 2469,
     "registry": 615,
-    "reports": 6701,
+    "reports": 6716,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2786,
+    "studies": 2794,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_061
+TESTS = 31_073
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
