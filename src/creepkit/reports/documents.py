@@ -13,6 +13,7 @@ import numpy as np
 
 SHOWN = {
     "AlloyResult": "alloy failure verdict decisive credible_laws equivalents laws",
+    "Band": "median low high lowest highest",
     "Challenge": "* sentence=__str__",
     "Channel": "name quantity reference written_unit missing",
     "CreepLaw": "name title fingerprint references constraints latex",
@@ -53,16 +54,20 @@ def _specimen(one: Any) -> Mapping[str, Any]:
     return {"units": units, "loads": loads, "lengths_mm": lengths}
 
 
-def _history(one: Any) -> Mapping[str, Any]:
+def _unit(output: str, specimen: str = "") -> str:
     from creepkit.records import output_unit
 
+    return output_unit(output, specimen)
+
+
+def _history(one: Any) -> Mapping[str, Any]:
     program = {} if one.loading.quantity == "components" else {"program": one.loading.program()}
     return {
         "frames": one.times.size,
         "used_frames": int(np.sum(one.used)),
         "times": one.times[[0, -1]],
         "outputs": {
-            name: {"unit": output_unit(name, one.specimen), "first": values[0], "last": values[-1]}
+            name: {"unit": _unit(name, one.specimen), "first": values[0], "last": values[-1]}
             for name, values in one.outputs.items()
         },
         "loading": {"quantity": one.loading.quantity, **program},
@@ -91,6 +96,7 @@ ALSO: dict[str, Callable[[Any], Mapping[str, Any]]] = {
     "History": _history,
     "Identification": lambda fit: {"parameters": {one.name: one for one in fit.estimates}},
     "InstrumentRecord": lambda one: {"duration": np.ptp(one.times), "channels": [*one.channels.values()]},
+    "OutputForecast": lambda one: {"unit": _unit(one.output)},
     "Plugin": lambda one: {
         "status": "broken" if one.problem else "ok",
         "offers": {word: [*things] for word, things in one.contributions.items()},
