@@ -21,7 +21,7 @@ BUDGET = {
     "composition": 411,
     "core": 67,
     "dataset": 713,
-    "discovery": 1388,
+    "discovery": 1389,
     "experiments": 1270,
     "exporters": 3335,
     "extraction": 1289,
@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 779,
-    "inverse": 9412,
+    "inverse": 9434,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,18 +41,18 @@ BUDGET = {
     "readers": 7021,
     "records": 2469,
     "registry": 615,
-    "reports": 6699,
+    "reports": 6713,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3203,
-    "studies": 2786,
+    "studies": 2794,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_056
+TESTS = 31_074
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

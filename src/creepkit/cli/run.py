@@ -28,7 +28,7 @@ def command(
         list[str] | None,
         typer.Option(
             metavar="STAGE",
-            help="extraction, record, quality, identification, temperature, rupture, forecast, design, export or "
+            help="extraction, record, quality, rupture, identification, temperature, forecast, design, export or "
             "report, with what it needs; may be given several times.",
         ),
     ] = None,

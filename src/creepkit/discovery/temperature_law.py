@@ -402,7 +402,8 @@ def refit(
         autocorrelation in it.
     max_refits : combinations that are refitted at most; the simplest law, Arrhenius with every other parameter
         constant, is always among them.
-    joint_fit : an identification of that law from all tests, where to begin.
+    joint_fit : an identification of that law from all tests, where to begin: where single temperatures leave
+        parameters open, other combinations begin at the tests made linear about it.
     """
     check_temperatures([h.mean_temperature for h in histories])
     cache = _RefitCache(
@@ -414,8 +415,9 @@ def refit(
         max_refits,
     )
     combinations, points, notes = temperature_law.combinations, temperature_law.isothermal_estimates, []
-    cache(combinations.best.candidate_forms, points, joint_fit)
     cache(_baseline(combinations), points, joint_fit)
+    if not (cache.fitted and points.has_undetermined_parameters):  # by which nothing is best
+        cache(combinations.best.candidate_forms, points)
     every, last = combinations.candidates, None
     linear = {name: [one for one in own if not one.nonlinear_parameters] or own for name, own in every.items()}
     try:
@@ -569,7 +571,7 @@ class _RefitCache:
         None stands for a search of the whole bounds: where the first law begins without a fit of it and points leave
         parameters open, or where a start has no conditioned coordinates.
         """
-        values, undetermined = regression.values, self.estimates.has_undetermined_parameters()
+        values, undetermined = regression.values, self.estimates.has_undetermined_parameters
         is_known = joint_fit is not None and set(joint_fit.law.names) == set(law.names)
         if joint_fit is not None and is_known:
             values = _internal_values(joint_fit)

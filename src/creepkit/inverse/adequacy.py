@@ -67,6 +67,20 @@ class LargestDeviation:
 
 
 @dataclass(frozen=True)
+class Remedy:
+    """An error that nobody modelled, with which a law that the tests reject would explain them.
+
+    kind : of the nuisance parameter that would stand for it, or "control" of what was held. description : it with the
+    largest size that it takes in a test, such as "an error of 0.01 mm in the thickness". is_usual : whether errors as
+    large as those of all tests are usual; a law of another kind explains the tests as well as larger ones do.
+    """
+
+    kind: str
+    description: str
+    is_usual: bool = True
+
+
+@dataclass(frozen=True)
 class Adequacy(Presentable):
     """What was found of whether a law explains the tests to their noise; `verdict` follows from it.
 
@@ -74,8 +88,7 @@ class Adequacy(Presentable):
     degrees of freedom. p_value : the least of all and of each, times their number. correlation : of what is left, as a
     share of the test (of outputs that span decades: the ln of a factor in time); NaN where nothing is. largest : where
     the law misses most; None if nothing is known.
-    remedies : errors that nobody modelled, with the largest size that they take in a test, such as "an error of 0.01 mm
-    in the thickness", with any of which the law would explain the tests.
+    remedies : errors that nobody modelled, with any of which the law would explain the tests.
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them.
     of_rates : explanations of that scatter, the likeliest first: the law's dependence on stress or temperature, one
         test, two groups of tests (see inverse.rate_explanations). outlying : one test alone that the others did not
@@ -96,7 +109,7 @@ class Adequacy(Presentable):
     p_value: float
     correlation: float
     largest: LargestDeviation | None
-    remedies: tuple[str, ...] = ()
+    remedies: tuple[Remedy, ...] = ()
     rate_scatter: float = 0.0
     of_rates: tuple[Explanation, ...] = ()
     outlying: Explanation | None = None

@@ -166,13 +166,13 @@ class BoundPenalties:
 
     def jacobian(self, u: Floats) -> Floats:
         """(limits, parameters) their derivatives at u (parameters,); those of constraints by central differences."""
-        rows = self.coordinates.jacobian(u)[self.penalised]
-        columns = [np.zeros(0)] * u.size
-        if self._constraints(self.coordinates.theta(u)).size:
-            for k, step in enumerate(np.diag(1e-6 * np.maximum(1.0, np.abs(u)))):
-                down, up = (self._constraints(self.coordinates.theta(v)) for v in (u + step, u - step))
-                columns[k] = (up - down) / (2 * step[k])
-        return self.WEIGHT * np.concatenate([rows, -rows, np.stack(columns, axis=1)])
+        rows, steps = self.coordinates.jacobian(u)[self.penalised], 1e-6 * np.maximum(1.0, np.abs(u))
+        of_constraints = np.zeros((0, u.size))
+        if self.coordinates.law_there.constraints:
+            ends = u + np.stack([np.diag(steps), np.diag(-steps)])
+            up, down = self._constraints(self.coordinates.theta(ends))
+            of_constraints = ((up - down) / (2.0 * steps[:, None])).T
+        return self.WEIGHT * np.concatenate([rows, -rows, of_constraints])
 
 
 def _constraint_margins(law: CreepLaw, point: Sequence[Floats]) -> Callable[[Floats], Floats]:

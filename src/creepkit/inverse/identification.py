@@ -193,7 +193,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
             return self.reference
         return replace(self.reference, stress=float(np.sqrt(low * high)))
 
-    @property
+    @cached_property
     def coordinates(self) -> Coordinates:
         """The map between conditioned coordinates and parameters."""
         return Coordinates(self.law, self.reference)

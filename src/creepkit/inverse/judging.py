@@ -24,9 +24,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from scipy.stats import chi2
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy, Remedy
 from creepkit.inverse.iterative_estimation import judged_at
 from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
 
 LOCAL_FRAMES = 5
 """Frames whose mean deviation says when a law misses a test."""
+
+UNUSUAL = 0.2
+"""Share of campaigns whose errors are together larger than usual ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +162,7 @@ class Judge:
             smallest_p_value=min(p_values),
         )
 
-    def remedies(self, linear: LinearisedProblem, effects: Sequence[Perturbation]) -> tuple[str, ...]:
+    def remedies(self, linear: LinearisedProblem, effects: Sequence[Perturbation]) -> tuple[Remedy, ...]:
         """The effects with which a law that is rejected would explain the tests, as they would have to be.
 
         A drift in one test alone is a rate that changes with time, which a law may have: nothing tells the two apart.
@@ -167,11 +171,12 @@ class Judge:
         for effect in effects:
             is_of_law = effect.common or (effect.kind == DRIFT and effect.tests == 1)
             if not is_of_law and self.adequacy(linear.with_effects([effect])).explains:
-                largest = float(np.abs(sizes_of_effect(linear, effect, self.noise_model)).max())
-                taken = replace(effect, size=effect.size * largest)
+                sizes = sizes_of_effect(linear, effect, self.noise_model)
+                taken = replace(effect, size=effect.size * float(np.abs(sizes).max()))
+                is_usual = float(chi2.sf((sizes**2).sum(), sizes.size)) > UNUSUAL
                 change = 100 * np.expm1(effect.per_kelvin * taken.size)
                 by_rate = f" ({change:.2g} % of the rate, by an assumed activation energy)" if effect.assumed else ""
-                remedies.append(f"{taken.description}{by_rate}")
+                remedies.append(Remedy(effect.kind, f"{taken.description}{by_rate}", is_usual))
         return tuple(remedies)
 
     @property

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -221,6 +222,7 @@ LARGEST_ERROR = 0.05
 """Relative standard deviation of a slope from the noise of a reading."""
 
 
+@lru_cache(maxsize=4096)  # a study asks for the exponent, for its bend and for the rates themselves
 def measured_minimum_rate(history: History) -> float:
     """The minimum creep rate that a test states or its strain shows, 1/s; NaN where it is not known.
 

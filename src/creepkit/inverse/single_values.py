@@ -163,15 +163,16 @@ class LawAtTests:
         if self.noise_model is not None:
             misfit = self.noise_model[output].misfit ** 2 if output in self.noise_model.outputs else 0.0
         posterior, locations, variances = self.scatter.posterior, [], []
-        parts = [self.scatter.joint(sd) for sd in posterior.sd]
+        means, covariances = self.scatter.joint_at_nodes
+        of_u = by_parameter @ coordinates.jacobian(self.u)
         for k, history in enumerate(histories):
             test = self.scatter.new_test(history, self._misfit(history))
             row = np.zeros(self.scatter.joint_design.shape[1])
-            row[: self.u.size] = by_parameter[k] @ coordinates.jacobian(self.u)
+            row[: self.u.size] = of_u[k]
             row[[*test.known.values()]] = effects[k] if misfit is not None else 0.0
             own = self.scatter.own_variance(test, posterior.sd) * effects[k] ** 2 + (misfit or 0.0)
-            locations.append([row @ mean for mean, _ in parts])
-            by_law = np.array([row @ covariance @ row for _, covariance in parts])
+            locations.append(means @ row)
+            by_law = covariances @ row @ row
             variances.append(by_law + (own if misfit is not None else (test.misfit * effects[k]) ** 2))
         mixture = MixtureDistribution(
             posterior.weight,

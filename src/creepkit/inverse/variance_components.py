@@ -163,9 +163,10 @@ def log_noise_prior(noise_model: NoiseModel) -> float:
 
 
 def scaled_inverse(matrix: Floats) -> Floats:
-    """Inverse (n, n) of a positive definite matrix (n, n) whose rows differ by orders of magnitude."""
-    scale = np.sqrt(np.diag(matrix))
-    return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))
+    """Inverses (..., n, n) of positive definite matrices (..., n, n) whose rows differ by orders of magnitude."""
+    scale = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
+    squares = scale[..., :, None] * scale[..., None, :]
+    return np.asarray(np.linalg.inv(matrix / squares) / squares)
 
 
 LONGEST_CORRELATION = 3.0

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.quality.flags import DataQuality
     from creepkit.rupture_assessment.assessment import RuptureAssessment
+    from creepkit.rupture_assessment.strength import StrengthEstimate
 
 
 MOST_CAUTIONS = 3
@@ -227,16 +228,36 @@ def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
             yield _with_interval(label, test.history.condition, values, factor, unit)
 
 
+def _longest_strengths(assessment: RuptureAssessment) -> list[StrengthEstimate]:
+    """The mean of the methods at the longest time at which one is known, a temperature each."""
+    found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
+    hours = max((one.hours for one in found), default=0.0)
+    return [one for one in found if one.hours == hours]
+
+
 def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     """Times to rupture at the stresses asked for, and the strength at the longest time, a figure a temperature of each.
 
     With intervals of their means.
     """
-    found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
-    hours = max((one.hours for one in found), default=0.0)
     lives = [_of_mean("time to rupture", f"{one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
-    at = f"{hours:g} h"
-    return [*lives, *(_of_mean("rupture strength", at, one.value, "MPa", one) for one in found if one.hours == hours)]
+    strengths = _longest_strengths(assessment)
+    return [*lives, *(_of_mean("rupture strength", f"{one.hours:g} h", one.value, "MPa", one) for one in strengths)]
+
+
+MOST_STRENGTHS = 3
+"""Temperatures that the line of strengths names: the outer ones, and one between them."""
+
+
+def strengths_line(assessment: RuptureAssessment) -> str:
+    """The strengths at the longest time in one line, with the intervals of their means; "" where none is known."""
+    found = _longest_strengths(assessment)
+    if not found:
+        return ""
+    places = dict.fromkeys(round(k) for k in np.linspace(0, len(found) - 1, MOST_STRENGTHS))
+    shown = (_of_mean("", "", found[k].value, "MPa", found[k]) for k in places)
+    at = [f"{celsius_text(found[k].temperature, digits=0)} {one.text}" for k, one in zip(places, shown, strict=True)]
+    return f"rupture strength, {found[0].hours:g} h: {', '.join(at)}"
 
 
 def known_bounds(one: Any) -> tuple[float, float]:

@@ -94,7 +94,7 @@ def _contradictions(fit: Identification) -> Iterator[str]:
     if adequacy.mentioned is not None:
         yield cause_caution(adequacy.mentioned)
     if adequacy.remedies and not adequacy.explanations:
-        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0])
+        yield CAUTIONS["remedy"].format(remedy=adequacy.remedies[0].description)
     yield from (CAUTIONS["implausible"].format(nuisance=nuisance_text(one)) for one in adequacy.implausible[:1])
     if adequacy.verdict == "cannot be judged" and not adequacy.unpredicted:
         yield CAUTIONS["noise unknown"]

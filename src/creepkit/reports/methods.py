@@ -46,7 +46,6 @@ CITATIONS = {
     "wilshire": "B. Wilshire, A. J. Battenbough (2007), Mater. Sci. Eng. A 443, 156",
     "monkman-grant": "F. C. Monkman, N. J. Grant (1956), Proc. ASTM 56, 593",
     "lindley": "D. V. Lindley (1956), Ann. Math. Stat. 27, 986-1005",
-    "pysindy": "B. M. de Silva et al. (2020), J. Open Source Softw. 5(49), 2104",
     "creepkit": f"The authors of creepkit, creepkit (software), version {version('creepkit')}, licence Apache-2.0",
 }
 """{key: citation} of methods, and of creepkit as CITATION.cff has it; those of laws stand in the laws."""
@@ -273,7 +272,7 @@ def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list
             f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons in the report."
         ]
     if contents.temperature:
-        how = f"by regression on isothermal estimates with their covariances{cite('pysindy')}"
+        how = "by regression on isothermal estimates with their covariances"
         yield [f"Forms of temperature of the parameters were chosen {how}, over all combinations of forms."]
     for assessment in contents.rupture.values():
         methods = dict.fromkeys(one.fit.method for one in assessment.ranked)

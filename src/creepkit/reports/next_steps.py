@@ -33,7 +33,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     if in_tests is not None:
         return cause_next_step(in_tests)
     if adequacy is not None and adequacy.remedies:
-        return NEXT["remedy"].format(remedy=adequacy.remedies[0])
+        return NEXT["remedy"].format(remedy=adequacy.remedies[0].description)
     if rejected(fit):
         if further := law_to_try(fit, [*(one.law.name for one in laws), *searched]):
             return NEXT["law"].format(law=further[0], why=TRY[further[1]])

@@ -100,7 +100,10 @@ class ProgressBar:
                 tell(f"{self._said} ({duration_text(now - self._begun)} so far)", err=True)
 
     def tick(self, task: str, done: int, total: int, note: str = "") -> None:
-        """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
+        """Report that `done` of `total` parts of a task are finished; note : what else there is to say.
+
+        A task that is done when it is named first, as an answer is, stands as it is.
+        """
         task, member = series_of_task(task)
         task = errors.printable(task)
         note = errors.printable(", ".join(part for part in (member, note) if part))
@@ -112,7 +115,7 @@ class ProgressBar:
         now = time.monotonic()
         if f"{task} {member}" != self._stage:
             self._stage, self._begun, self._due = f"{task} {member}", now, now + self.LONG_STAGE
-            tell(f"{task}{member and f' {member}'} ...", err=True)
+            tell(f"{task}{member and f' {member}'}{' ...' * (done < total)}", err=True)
         left = f", about {duration_text((now - self._begun) * (total / done - 1))} more" if 0 < done < total else ""
         more = note.removeprefix(member).lstrip(", ")
         self._said = f"{self._stage.strip()}: {done} of {total}{more and f' ({more})'}{left}"

@@ -175,7 +175,7 @@ def adequacy_text(found: Adequacy) -> str:
         contradiction="" if contradicting is None else contradiction_text(contradicting),
         parts=" and ".join(parts) or OF_VERDICTS["noise"],
         largest="" if found.largest is None else _largest(found.largest),
-        remedies=() if found.explanations else found.remedies,
+        remedies=() if found.explanations else [one.description for one in found.remedies],
         cause=cause,
     )
 
@@ -325,7 +325,11 @@ def _reason(ranking: Ranking) -> str:
     elif "asked" in unmet and adequacy is not None and adequacy.explains:
         kind = "asked"
     explanations, own = ([], ()) if adequacy is None else (adequacy.explanations, adequacy.remedies)
-    found = {r.fit.law.name: a.remedies for r in ranking.laws if (a := r.fit.adequacy) and a.remedies}
+    found = {
+        r.fit.law.name: [o.description for o in a.remedies]
+        for r in ranking.laws
+        if (a := r.fit.adequacy) and a.remedies
+    }
     remedied = "" if own or refuted else next(iter(found), "")
     asked, lost = len(ranking.laws) - len(ranking.further), UNMET["convergence"] * ("convergence" in unmet)
     others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]

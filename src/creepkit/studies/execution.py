@@ -124,7 +124,7 @@ class Execution:
             self._report(stage, 0, 1, place)
             if self._read(stage, key):
                 self._record(stage, "kept", key, stage.remark)
-                self._report(stage, 1, 1, "kept from before")
+                self._end(stage, "kept from before")
             else:
                 self._make(stage, key)
 
@@ -140,6 +140,12 @@ class Execution:
     def _report(self, stage: Stage, done: int, total: int, note: str) -> None:
         if self.progress is not None:
             self.progress(stage.name, done, total, note)
+
+    def _end(self, stage: Stage, note: str) -> None:
+        """Report that a stage has its result, and what it says, as a task that is done when it is named first."""
+        self._report(stage, 1, 1, note)
+        if stage.answer is not None and self.progress is not None and (line := stage.answer(self.results[stage.name])):
+            self.progress(f"{stage.group}: {line}" if stage.group else line, 1, 1, "")
 
     def _read(self, stage: Stage, key: str) -> bool:
         """Whether there is a result of this key that can be read.
@@ -198,7 +204,7 @@ class Execution:
             again = f"is made again in each run, for it cannot be stored: {failure_text(error)}"
             sentence = "; ".join(filter(None, (sentence, again)))
         self._record(stage, "made", key, sentence)
-        self._report(stage, 1, 1, f"done in {duration_text(time.monotonic() - start)}")
+        self._end(stage, f"done in {duration_text(time.monotonic() - start)}")
 
     def _made(self, stage: Stage, tick: Callable[[str, int, int], None]) -> Any:
         with keep_fits(self.folder.fits):
@@ -216,9 +222,9 @@ StageKind = Literal[
     "extraction",
     "record",
     "quality",
+    "rupture",
     "identification",
     "temperature",
-    "rupture",
     "forecast",
     "design",
     "export",
@@ -227,7 +233,10 @@ StageKind = Literal[
 
 
 STAGE_KINDS: tuple[StageKind, ...] = get_args(StageKind)
-"""In the order in which they are made, which stands here alone; `creepkit run --only` takes these names."""
+"""In the order in which they are made, which stands here alone; `creepkit run --only` takes these names.
+
+Strengths take seconds and need no law: whoever has a table of ruptures reads them before laws are identified.
+"""
 
 
 Tick = Callable[[str, int, int], None]
@@ -248,6 +257,7 @@ class Stage:
     document : what of a result that no record can be read from is written down, as JSON-able data.
     predictor : of identifications that its file holds. file : that an export is written to, "" for other stages.
     remark : what is known beforehand that the result leaves out of account, "" where nothing is.
+    answer : a line that is told as soon as the result is there.
     name : of its result, by default that of a stage of which each group has one.
     """
 
@@ -262,6 +272,7 @@ class Stage:
     file: str = ""
     remark: str = ""
     name: str = ""
+    answer: Callable[[Any], str] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.name or stage_name(self.kind, self.group))

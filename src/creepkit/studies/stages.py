@@ -1,4 +1,4 @@
-"""The stages of a study's tables: quality, identification, temperature, rupture, forecasts, designs and exports."""
+"""The stages of a study's tables: quality, rupture, identification, temperature, forecasts, designs and exports."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from creepkit.options import values_of_table
 from creepkit.quality import DataQuality
 from creepkit.records import ZERO_CELSIUS, History, Nuisance, known_specimens
 from creepkit.registry import default_registry, kinds
+from creepkit.reports.answer import strengths_line
 from creepkit.reports.contents import ExportedFile
 from creepkit.studies import arguments
 from creepkit.studies.arguments import check_forecast, planned_test
@@ -126,6 +127,29 @@ def _quality_stage(study: StageInputs) -> Stage:
     return Stage("quality", "", _digests(framed), make, DataQuality)
 
 
+# ---- strengths -------------------------------------------------------------------------------------------------------
+
+
+def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
+    """The assessment of the rupture times of a group."""
+    from creepkit.rupture_assessment.assessment import RuptureAssessment, RuptureQuestion, RuptureSettings
+
+    part, tests = study.file.model.rupture, list(group.histories)
+    assert part is not None
+    with study.file.at("rupture"):
+        settings = ck.RuptureSettings(seed=study.file.model.study.seed)
+        settings = settings.changed(values_of_table(RuptureSettings, part))
+    how = values_of_table(RuptureQuestion, part)
+    if part.tensile_strengths:
+        how["tensile_strength"] = {o.temperature_C + ZERO_CELSIUS: o.strength_MPa for o in part.tensile_strengths}
+
+    def make(results: Results, tick: Tick) -> RuptureAssessment:
+        return ck.rupture(tests, settings=settings, **how)
+
+    described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
+    return Stage("rupture", group.name, described, make, RuptureAssessment, answer=strengths_line)
+
+
 # ---- laws ----------------------------------------------------------------------------------------------------------
 
 
@@ -220,27 +244,7 @@ def _best_candidate(study: StageInputs, ranking: Ranking, group: TestGroup) -> t
     return (next(iter(named.values())) if fit is None else named[fit.law.name]), fit
 
 
-# ---- what follows from tests and laws ------------------------------------------------------------------------------
-
-
-def _rupture_stage(study: StageInputs, group: TestGroup) -> Stage:
-    """The assessment of the rupture times of a group."""
-    from creepkit.rupture_assessment.assessment import RuptureAssessment, RuptureQuestion, RuptureSettings
-
-    part, tests = study.file.model.rupture, list(group.histories)
-    assert part is not None
-    with study.file.at("rupture"):
-        settings = ck.RuptureSettings(seed=study.file.model.study.seed)
-        settings = settings.changed(values_of_table(RuptureSettings, part))
-    how = values_of_table(RuptureQuestion, part)
-    if part.tensile_strengths:
-        how["tensile_strength"] = {o.temperature_C + ZERO_CELSIUS: o.strength_MPa for o in part.tensile_strengths}
-
-    def make(results: Results, tick: Tick) -> RuptureAssessment:
-        return ck.rupture(tests, settings=settings, **how)
-
-    described = [part.model_dump(), record_to_json(asdict(settings)), _digests(tests)]
-    return Stage("rupture", group.name, described, make, RuptureAssessment)
+# ---- what follows from laws ------------------------------------------------------------------------------------------
 
 
 def _forecast_stage(study: StageInputs, number: int) -> Stage:
@@ -323,9 +327,9 @@ def _export_stage(study: StageInputs, number: int, group: TestGroup) -> Stage:
 
 
 OF_EACH_GROUP: Mapping[StageKind, Callable[[StageInputs, TestGroup], Stage]] = {
+    "rupture": _rupture_stage,
     "identification": _identification_stage,
     "temperature": _temperature_stage,
-    "rupture": _rupture_stage,
     "design": _design_stage,
 }
 """{kind: its stage} of tables that stand once in the file and hold for every group, or for the one that they name."""

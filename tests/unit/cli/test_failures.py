@@ -111,7 +111,7 @@ def test_controls_are_shown_as_codes_and_lines_and_tabs_stay(capsys: pytest.Capt
     assert "\\u0007 [red]" in out
     assert "cell \\u001b[31m [/red]" in out
     assert out.endswith('{"name": "\x1b"}')
-    assert err == "wrote a\\u000ab\\u001b.csv: 2 frames\nfile \\u001b[31m ...\n"
+    assert err == "wrote a\\u000ab\\u001b.csv: 2 frames\nfile \\u001b[31m\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows allows no such names")

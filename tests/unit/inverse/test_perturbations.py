@@ -109,8 +109,8 @@ def test_a_drift_of_one_test_alone_is_no_cause_and_one_of_several_is_given_in_ra
     ahead = [1 + 0.5 * drift * TIMES / END for drift in (0.1, -0.08, 0.06)]
     drifted = [one.replace(outputs={"strain": one.outputs["strain"] * a}) for one, a in zip(tests, ahead, strict=True)]
     three, alone = (identify(NORTON, one, BAR, settings=SETTINGS).adequacy for one in (drifted, drifted[2:]))
-    assert "(10 % of the rate, by an assumed activation energy)" in three.remedies[0]
-    assert (alone.rejects, [one for one in alone.remedies if DRIFT in one]) == (True, [])
+    assert "(10 % of the rate, by an assumed activation energy)" in three.remedies[0].description
+    assert (alone.rejects, [one for one in alone.remedies if one.kind == DRIFT]) == (True, [])
 
 
 # ---- what an effect does to the rate ------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from creepkit.studies.inputs import input_files
 from creepkit.studies.proposal import propose_study
 from creepkit.studies.study import study_of_report
 from creepkit.studies.study_file import parse_study
+from helpers.command_line import creepkit
 from helpers.rate_tables import GAS_CONSTANT
 from helpers.study_runs import ONE_FIT, STUDY, numbers, states
 
@@ -286,3 +287,22 @@ def test_answers_beside_the_data_are_among_its_files(folder):
     (data / "tests.toml").write_text('["other.csv"]\ncolumns = {Last = "stress"}\n')
     files = input_files(parse_study(study, '[data]\nfiles = ["data"]\n'), [data], [])
     assert {one.path.name for one in files} == {"table.csv", "other.csv", "tests.toml"}
+
+
+def test_strengths_are_told_before_laws_are_identified(folder):
+    path = folder / "study.toml"
+    tables = '[identification]\nstarts = 1\nlaws = ["norton"]\n[temperature]\n[rupture]\ntimes_h = [10000]\n'
+    path.write_text(f'[data]\nfiles = ["data/*.csv"]\n{tables}')
+    strength = 150.0 * (0.015 / 1e-5 / 1e4) ** (1.0 / EXPONENT)  # MPa at 600 °C, for the life is 0.015 over the rate
+    for _ in range(2):  # made, and kept from before
+        told = creepkit("run", path, "--only", "rupture", "--only", "identification").stderr.splitlines()
+        line = next(k for k, one in enumerate(told) if one.startswith("rupture strength, 10000 h: 550 °C "))
+        assert line < told.index("identification ...")
+        low, high = map(float, re.findall(r"600 °C [\d.]+ MPa \[([\d.]+), ([\d.]+)\]", told[line])[0])
+        assert low < strength < high < 1.2 * low
+    assert [one.kind for one in ck.Study.load(path).run().stages] == [
+        "quality",
+        "rupture",
+        "identification",
+        "temperature",
+    ]

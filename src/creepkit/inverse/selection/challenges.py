@@ -229,7 +229,7 @@ def explaining_effects(fits: Sequence[Identification], weights: Floats) -> tuple
 def _explains_with(fit: Identification, effect: Perturbation) -> bool:
     """Whether a law explains the tests, with that perturbation where it does not without."""
     adequacy = fit.adequacy
-    return adequacy is not None and (adequacy.explains or any(effect.kind in one for one in adequacy.remedies))
+    return adequacy is not None and (adequacy.explains or any(effect.kind == one.kind for one in adequacy.remedies))
 
 
 SHARE = 0.3

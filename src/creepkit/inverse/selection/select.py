@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError, LawError
+from creepkit.inverse.adequacy import Remedy
 from creepkit.inverse.candidates import candidates
 from creepkit.inverse.compared_tests import common_rupture_times, testable_laws
 from creepkit.inverse.composite_predictor import through_for_law
@@ -125,11 +126,13 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
 
     A best law with damage is tried with primary creep first.
 
-    Nothing where a candidate would explain them with an effect that is not modelled, or but for one test or for two
-    groups of tests: that is the simpler explanation.
+    Nothing where a candidate would explain them with errors as large as usual that are not modelled, or but for one
+    test or for two groups of tests: that is the simpler explanation.
     """
     adequacies = [ranked.fit.adequacy for ranked in ranking.laws]
-    if any(a is None or a.verdict != "leaves a discrepancy" or a.remedies or a.lies_in_tests for a in adequacies):
+    if any(a is None or a.verdict != "leaves a discrepancy" or a.lies_in_tests for a in adequacies):
+        return []
+    if any(remedy.is_usual for adequacy in adequacies if adequacy is not None for remedy in adequacy.remedies):
         return []
     laws = [ranked.fit.law for ranked in ranking.laws]
     tried = {law.fingerprint for law in laws}
@@ -231,7 +234,7 @@ def with_hold_tried(fit: Identification) -> Identification:
         found = identify(fit.law, tests, fit.predictor, settings=settings, start=start)
         likelier = adequacy.rejects or found.log_likelihood > fit.log_likelihood + VERDICT_ODDS
         if found.adequacy is not None and found.adequacy.explains and likelier:
-            remedies = (HELD_INSTEAD[held.pop()], *adequacy.remedies)
+            remedies = (Remedy("control", HELD_INSTEAD[held.pop()]), *adequacy.remedies)
             return replace(fit, adequacy=replace(adequacy, remedies=remedies))
     return fit
 

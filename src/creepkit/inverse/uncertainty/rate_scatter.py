@@ -238,7 +238,7 @@ class RateScatter:
         return Evidence(log, mean[unknowns:], sd[unknowns:], step, p_value[unknowns:])
 
     def joint(self, sd: Floats) -> tuple[Floats, Floats]:
-        """Mean (unknowns + effects,) and covariance of (dx, c) about the estimate, given sd (levels,) of the effects.
+        """Means (..., unknowns + effects) and covariances of (dx, c) about the estimate, given sd (..., levels).
 
         Where the estimate is not the optimum under this covariance (it is one of least squares), its distance from
         that counts as an error of the estimate: dx has the mean zero, and as covariance its second moment. Errors
@@ -246,19 +246,27 @@ class RateScatter:
         """
         _, optimum, covariance = self.solved(sd)
         size = self.design.shape[1]
-        shift, own = optimum[:size], covariance[:size, :size]
-        gain = covariance[size:, :size] @ scaled_inverse(own)
-        about = own + np.outer(shift, shift)
-        mean = np.concatenate([np.zeros(size), optimum[size:] - gain @ shift])
-        cross, effects = about @ gain.T, covariance[size:, size:] + gain @ np.outer(shift, shift) @ gain.T
-        return mean, np.block([[about + (0.0 if self.errors is None else self.errors), cross], [cross.T, effects]])
+        shift, own = optimum[..., :size], covariance[..., :size, :size]
+        gain = covariance[..., size:, :size] @ scaled_inverse(own)
+        second = shift[..., :, None] * shift[..., None, :]
+        about, transposed = own + second, np.swapaxes(gain, -1, -2)
+        effects = optimum[..., size:] - (gain @ shift[..., None])[..., 0]
+        joint = np.empty_like(covariance)
+        joint[..., :size, :size] = about + (0.0 if self.errors is None else self.errors)
+        joint[..., :size, size:] = about @ transposed
+        joint[..., size:, :size] = gain @ about
+        joint[..., size:, size:] = covariance[..., size:, size:] + gain @ second @ transposed
+        return np.concatenate([np.zeros_like(shift), effects], axis=-1), joint
+
+    @cached_property
+    def joint_at_nodes(self) -> tuple[Floats, Floats]:
+        """Means (nodes, unknowns + effects) and covariances of (dx, c) at the nodes of the posterior distribution."""
+        return self.joint(self.posterior.sd)
 
     @cached_property
     def mean_joint(self) -> tuple[Floats, Floats]:
         """Mean and covariance of (dx, c) over the posterior distribution of the standard deviations."""
-        posterior = self.posterior
-        parts = [self.joint(sd) for sd in posterior.sd]
-        means, covariances = np.stack([m for m, _ in parts]), np.stack([c for _, c in parts])
+        posterior, (means, covariances) = self.posterior, self.joint_at_nodes
         mean = posterior.weight @ means
         deviation = means - mean
         between = np.einsum("n,ni,nj->ij", posterior.weight, deviation, deviation)

@@ -30,7 +30,7 @@ def bars(held, stated, seed=3):
 def test_what_was_held_is_a_remedy_where_it_explains_the_curves(held, stated):
     fit = ck.identify("norton", bars(held, stated))
     assert fit.adequacy.rejects
-    assert f"(control = {held})" in fit.adequacy.remedies[0]
+    assert f"(control = {held})" in fit.adequacy.remedies[0].description
     assert f"(control = {held})" in str(fit)
     assert ck.select(["norton"], bars(held, stated)).further == ()  # no richer law, whose exponents mimic it
 
@@ -48,4 +48,4 @@ def test_an_exponent_that_the_bend_of_curves_sets_leaves_the_rates_behind():
     for stress in (100.0, 110.0, 120.0, 130.0, 140.0):
         values = 0.018 * (stress / 140.0) ** 4.8 * (times / 1.44e7) ** 0.4 * np.exp(0.004 * rng.normal(size=30))
         tests.append(ck.History(f"{stress:g}", times, {"strain": values}, ck.constant_stress(stress, "load"), 873.15))
-    assert "(control = stress)" in ck.identify("time-hardening", tests).adequacy.remedies[0]
+    assert "(control = stress)" in ck.identify("time-hardening", tests).adequacy.remedies[0].description
