@@ -333,6 +333,8 @@ def _reason(ranking: Ranking) -> str:
     remedied = "" if own or refuted else next(iter(found), "")
     asked, lost = len(ranking.laws) - len(ranking.further), UNMET["convergence"] * ("convergence" in unmet)
     others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
+    texts = {"left": adequacy_text, "explanation": explanation_text, "qualified": qualification}
+    of_adequacy = {name: "" if adequacy is None else text(adequacy) for name, text in texts.items()}
     return say(
         CHOICES[kind],
         **{"best": ranking.best.law.name, "count": len(ranking.laws), "verdict": _of_best(ranking), "lost": lost},
@@ -340,7 +342,6 @@ def _reason(ranking: Ranking) -> str:
         **{"refuted": refuted, "unmet": "; ".join(others), "names": names, "others": names[1:]},
         **{"remedied": remedied, "remedies": found.get(remedied, ()), "further": len(ranking.further)},
         cause=cause_headline(explanations[0]) if explanations else "",
-        explanation="" if adequacy is None else explanation_text(adequacy),
+        **of_adequacy,
         none=say(CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
-        qualified="" if adequacy is None else qualification(adequacy),
     )

@@ -73,7 +73,7 @@ _WORDS, _PART, _FIELD = _Words(), re.compile("<(.*?)>"), re.compile("{.*?}")
 """Part of a sentence that may be left out, and a field."""
 
 
-def say(text: str, **values: Any) -> str:
+def say(text: str, /, **values: Any) -> str:
     """A sentence with its values, without the parts between < and > of which a value is empty, nothing or not known."""
 
     def part(found: re.Match[str]) -> str:

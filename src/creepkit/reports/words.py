@@ -23,18 +23,14 @@ HEADLINES = {
 }
 """{kind: the first line of an answer}; range : of the tests."""
 
-
 ONE_TEST = "a new {level}'s {quantity} within a factor of {factor} (95 %)"
 """Behind the range of a law, of three tests or more; of fewer their mean misfit stands there."""
-
 
 MEAN_MISFIT = "mean misfits: {misfits}"
 """Of the tests that were fitted, behind how many they are."""
 
-
 FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
 """What was measured, with the root mean square of predicted over measured in the fitted tests."""
-
 
 TRUTHS = {
     # no noise is stated, and too few readings show it
@@ -47,7 +43,6 @@ TRUTHS = {
     "rejected": "the tests reject it as exact",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
-
 
 CAUTIONS = {
     # a value lies within 0.1 % of a bound of its search that is not physical
@@ -81,10 +76,8 @@ CAUTIONS = {
 }
 """{kind: a caution}, the most serious first."""
 
-
 IN_EACH_TEST, ONE_ALONE = ", another in each test", ", that of one test by {change}"
 """Of several tests; and what it does to one by itself, where that is known."""
-
 
 REASONS = {
     # a law of creep and rupture misses both, in opposite ways
@@ -99,7 +92,6 @@ REASONS = {
     "noise": "they differ from it by more than their noise",
 }
 """{kind: why the tests reject a law}; of several the others are cautions of their own."""
-
 
 NEXT = {
     # groups of tests differ that their labels tell apart
@@ -149,34 +141,26 @@ NEXT = {
 }
 """{kind: what to do now}."""
 
-
 BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
 """Below the numbers of an answer."""
-
 
 NEW_TEST = "{condition}, one new test"
 """Where a number holds whose interval has the scatter between tests in it."""
 
-
 OVER_ALL_TESTS, MEAN_SLOPE = "over all tests", "slope of the measured rates: {value}"
 """Where a stress exponent or activation energy is that of the measured rates; and beside the law's at one condition."""
-
 
 MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 """Above the picture of minimum rates."""
 
-
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
-
 
 CODES, MORE_CODES = "In {codes}", "creepkit export, also for other codes"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
-
 ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
-
 
 CONSTANT_LOAD = (
     "under a constant load the true stress rises with strain, here by up to {growth}: "
@@ -184,21 +168,19 @@ CONSTANT_LOAD = (
 )
 """Beside the exponent of such tests."""
 
-
 COMPARED = {
     # a law with a smaller misfit than the best, and why it is behind
     "readings": "{law} has the smaller misfit of {what}, but its chi-square over all readings is {more} higher",
     # its chi-square is not higher
     "parameters": "{law} has the smaller misfit of {what}, but its parameters cost more ({excess} behind)",
     # nobody asked for it
-    "left out": "{law} has the smaller misfit of {what}, but nobody asked for it, and it predicts left-out tests worse",
+    "left out": "{law} has the smaller misfit of {what}, but was not asked for and predicts left-out tests worse",
     # it gives no number for some readings
     "unpredicted": "{law} has the smaller misfit of {what}, but does not predict every test",
     # below their table
     "chi-square": "laws are ranked by all readings under one covariance, not by mean misfits; verdicts by noise alone",
 }
 """{kind: what is said of laws that were compared}."""
-
 
 RUPTURE = {
     # weights of 0.05 or more
@@ -221,7 +203,6 @@ RUPTURE = {
     "strengths": "use these strengths with their bounds",
 }
 """{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
-
 
 FORECAST = {
     # one test
@@ -267,7 +248,6 @@ FORECAST = {
 }
 """{kind: what a forecast says}, its first line and how far to trust it, by which laws, cautions, what to do next."""
 
-
 DESIGN = {
     # one run
     "test": "next test: {test}; {told}",
@@ -312,7 +292,6 @@ DESIGN = {
 }
 """{kind: what a design of further tests says}, its first line, what it tells, and what to do next."""
 
-
 TRY = {
     # rates say so
     "exponent rises": "the stress exponent rises with stress",
@@ -324,7 +303,6 @@ TRY = {
     "late": "this one misses the end of the curves",
 }
 """{kind: why a law is to be tried}."""
-
 
 CAUSES = {
     # one test disagrees with all others
@@ -343,7 +321,6 @@ CAUSES = {
     "activation energy": "the activation energy {rises} from {low:kJ/mol} at {start:C} to {high:kJ/mol} at {end:C}",
 }
 """{kind: why tests reject a law, or which of them do}, in a headline."""
-
 
 CAUSES_AT_LENGTH = {
     # as above
@@ -368,7 +345,6 @@ CAUSES_AT_LENGTH = {
 }
 """{kind: the same with its numbers}, where a verdict is given at length."""
 
-
 CAUSE_CAUTIONS = {
     # one test
     "one test": "{one.tests[0]} creeps {sizes} times as fast as the others lead to expect<; {kelvin} would do it>",
@@ -378,7 +354,6 @@ CAUSE_CAUTIONS = {
     "others": "{cause}: {odds:.2g} times likelier than scatter, too little for a verdict",
 }
 """{kind: the same as a caution}."""
-
 
 ERRORS = {
     # of strain, load or time by a factor
@@ -391,7 +366,6 @@ ERRORS = {
     "load": "at a load {change:%} {lower}",
 }
 """{kind: with which error of what is stated a test would agree}."""
-
 
 VERDICTS = {
     # a simulation ends before a reading
@@ -410,7 +384,6 @@ VERDICTS = {
     "<. It would explain them with {remedies:or with}, which nobody modelled><; {cause}>",
 }
 """{kind: the verdict at length}, behind "the law" or "it"."""
-
 
 OF_VERDICTS = {
     # of each output that is missed
@@ -435,7 +408,7 @@ OF_VERDICTS = {
     # a remark on it
     "critical": "critical value {found.critical_chi_square:.3g}",
     # noise is estimated from few readings
-    "expected": "expected {found.expected_chi_square:.3g} for a correct law, as the noise itself is estimated",
+    "expected": "expected {found.expected_chi_square:.3g}, as noise is estimated",
     # of several outputs
     "adjusted": "<smallest {found.smallest_p_value:p}, >{p} adjusted for {count} comparisons (Bonferroni)",
     # minimum rates and rupture times
@@ -446,7 +419,6 @@ OF_VERDICTS = {
     "trend": ", and their ratio changes with stress or temperature",
 }
 """{kind: a part of a verdict}."""
-
 
 SHORT_VERDICTS = {
     # nothing can be judged
@@ -464,12 +436,11 @@ SHORT_VERDICTS = {
 }
 """{kind: the verdict in few words}, in tables."""
 
-
 NOISE_UNKNOWN = {
     # of curves
     "frames": "no noise is stated, and too few readings< of {tests}> show it: noise that is estimated from fewer than "
-    "{fewest:.0f} readings of a test cannot judge whether a law explains it (state it in a column such as {column}_sd, "
-    "in Python as standard_deviation)",
+    "{fewest:.0f} readings of a test cannot judge whether a law explains it; state it in a column such as {column}_sd, "
+    "in Python as standard_deviation",
     # of minimum rates
     "rates": "no noise of the minimum rates is stated, and scatter between tests was estimated from them. State it in "
     "a column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd",
@@ -477,7 +448,6 @@ NOISE_UNKNOWN = {
     "ruptures": "rupture times alone show no noise beside the scatter between tests, which was estimated from them",
 }
 """{kind: why nothing is known of the noise, and where to state it}."""
-
 
 CHOICES = {
     # all conditions are met
@@ -491,7 +461,7 @@ CHOICES = {
     # the best law is rejected
     "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best, {best} "
     "({weight}<, not told apart from {others:and}><; with {remedies:or}, which nobody modelled, {remedied} would "
-    "explain them>), {verdict}",
+    "explain them>), {left}",
     # a law that nobody asked for is not
     "asked": "{none} the tests; of {further} more that were tried, {best} is not rejected by them ({weight}): plan "
     "tests that can refute it",
@@ -516,7 +486,6 @@ CHOICES = {
 }
 """{kind: which law it is}, at length."""
 
-
 UNMET = {
     # as it says
     "alternatives": "only {best} was fitted",
@@ -530,7 +499,6 @@ UNMET = {
     "challenges": "what else the tests allow was not examined",
 }
 """{condition of a decisive choice: that it is not met}."""
-
 
 CHALLENGES = {
     # a usual error with which other laws explain the tests
@@ -558,7 +526,6 @@ CHALLENGES = {
 }
 """{kind: what the tests allow beside the best law}, behind "but"."""
 
-
 SIZES = {
     # of a length, of each test
     "lengths": "independent errors of up to {size:.2g} % in the {what} of {where}",
@@ -575,12 +542,11 @@ SIZES = {
 }
 """{kind: a perturbation with the size that it takes}; plural where each test has its own."""
 
-
 PERTURBATIONS = {
     # of temperature, of one test
     "drift": "a linear drift of {one.size:.2g} K over the test",
     # of several
-    "drifts": "independent linear drifts of the temperature, {one.size:.2g} K over each of {one.tests} tests",
+    "drifts": "independent drifts of the temperature, {one.size:.2g} K over each of {one.tests} tests",
     # of what is stated or read, of one test
     "error": "an {error} of {one.amount} in the {what} of the test",
     # of several
@@ -591,7 +557,6 @@ PERTURBATIONS = {
     "not included": "the intervals do not include what would move the rate amid the tests: {effects}",
 }
 """{kind: what nobody measured}, with what it does to the rate."""
-
 
 REMARKS = {
     # of one start, or of all the same
