@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from creepkit.records.presentable import function_of_reports
+
 SHOWN = {
     "AlloyResult": "alloy failure verdict decisive credible_laws equivalents laws",
     "Band": "median low high lowest highest",
-    "Challenge": "* sentence=__str__",
     "Channel": "name quantity reference written_unit missing",
     "CreepLaw": "name title fingerprint references constraints latex",
     "Design": "* sentence",
@@ -87,6 +88,7 @@ def _registered(one: Any) -> Mapping[str, Any]:
 
 
 ALSO: dict[str, Callable[[Any], Mapping[str, Any]]] = {
+    "Challenge": lambda one: {"sentence": function_of_reports("remarks.challenge_text")(one)},
     "Channel": lambda one: {"ends": [] if one.missing == one.values.size else _ends(one.values)},
     "CreepLaw": lambda law: {
         "terms": law.terms,

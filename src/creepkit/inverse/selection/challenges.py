@@ -54,7 +54,6 @@ from creepkit.inverse.sparsity.term_selection import TermContributions
 from creepkit.language import CreepLaw, Param, stress
 from creepkit.language.symbols import Symbol
 from creepkit.records import Nuisance, is_length_nuisance
-from creepkit.records.presentable import Presentable
 
 MOST_NAMED = 2
 """Perturbations, and laws that explain the tests with them, that a sentence names."""
@@ -75,7 +74,7 @@ class PerturbationSize:
 
 
 @dataclass(frozen=True)
-class Challenge(Presentable):
+class Challenge:
     """Something that the tests allow, so that the law of most weight is not proved.
 
     kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
@@ -98,8 +97,6 @@ class Challenge(Presentable):
     sizes: tuple[PerturbationSize, ...] = ()
     laws: tuple[str, ...] = ()
     weights: tuple[float, ...] = ()
-
-    shown_by = "verdicts.challenge_text"
 
 
 Scope = Literal["test", "all"]
