@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 779,
-    "inverse": 9434,
+    "inverse": 9435,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
