@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7021,
     "records": 2469,
     "registry": 615,
-    "reports": 6698,
+    "reports": 6700,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_120
+TESTS = 31_129
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -208,8 +208,13 @@ def verdict_text(found: Adequacy | None) -> str:
     if found.explanations and (found.lies_in_tests or kind == "rates"):
         kind = "cause"
     kind = "explains" if found.explains else "values" if found.contradicting is not None else kind
-    cause = cause_headline(found.explanations[0]) if found.explanations else ""
-    return say(SHORT_VERDICTS[kind], found=found, cause=cause, nuisance=[*(o.kind for o in found.implausible), ""][0])
+    return say(
+        SHORT_VERDICTS[kind], found=found, cause=_cause(found), nuisance=[*(o.kind for o in found.implausible), ""][0]
+    )
+
+
+def _cause(found: Adequacy) -> str:
+    return "".join(map(cause_headline, found.explanations[:1]))
 
 
 def explanation_text(found: Adequacy) -> str:
@@ -315,35 +320,25 @@ def _of_best(ranking: Ranking) -> str:
     return CAUTIONS["unknown"] if found is None else f"it {adequacy_text(found)}"
 
 
-def _with_errors(laws: Sequence[RankedLaw]) -> str:
-    """Which of them would explain the tests with an error that nobody modelled, as the end of a clause; or ""."""
-    for ranked in laws:
-        if ranked.fit.adequacy is not None and ranked.fit.adequacy.remedies:
-            errors = " or ".join(one.description for one in ranked.fit.adequacy.remedies)
-            return f"; with {errors}, which nobody modelled, {ranked.fit.law.name} would explain them"
-    return ""
-
-
 def _reason(ranking: Ranking) -> str:
     """Why a ranking of several laws is not decisive."""
     names, adequacy, unmet = [r.fit.law.name for r in ranking.credible], ranking.adequacy, ranking.unmet
     refuted = _refuted(ranking) if "challenges" in unmet else []
     kind = "apart" if len(names) > 1 else "challenged" if refuted and ranking.singled_out else "best"
     if adequacy is not None and adequacy.rejects:
-<<<<<<< HEAD
         kind = "in tests" if adequacy.lies_in_tests else "none"
     elif "asked" in unmet and adequacy is not None and adequacy.explains:
         kind = "asked"
-    explanations, own = ([], ()) if adequacy is None else (adequacy.explanations, adequacy.remedies)
+    own = () if adequacy is None else adequacy.remedies
     found = {
         r.fit.law.name: [o.description for o in a.remedies]
         for r in ranking.laws
-        if (a := r.fit.adequacy) and a.remedies
+        if (a := r.fit.adequacy) and a.remedies and not (kind == "asked" and r.fit.law.name in ranking.further)
     }
-    remedied = "" if own or refuted else next(iter(found), "")
+    remedied = "" if kind == "none" and (own or refuted) else next(iter(found), "")
     asked, lost = len(ranking.laws) - len(ranking.further), UNMET["convergence"] * ("convergence" in unmet)
     others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
-    texts = {"left": adequacy_text, "explanation": explanation_text, "qualified": qualification}
+    texts = {"left": adequacy_text, "explanation": explanation_text, "qualified": qualification, "cause": _cause}
     of_adequacy = {name: "" if adequacy is None else text(adequacy) for name, text in texts.items()}
     return say(
         CHOICES[kind],
@@ -351,31 +346,6 @@ def _reason(ranking: Ranking) -> str:
         weight=say(CHOICES["weight"], weight=ranking.laws[0].weight, lost=lost),
         **{"refuted": refuted, "unmet": "; ".join(others), "names": names, "others": names[1:]},
         **{"remedied": remedied, "remedies": found.get(remedied, ()), "further": len(ranking.further)},
-        cause=cause_headline(explanations[0]) if explanations else "",
         **of_adequacy,
         none=say(CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
     )
-=======
-        if adequacy.lies_in_tests:
-            first = cause_headline(adequacy.explanations[0])
-            return f"{tried} {best} is best ({weight}), but {first}: {explanation_text(adequacy)}"
-        others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
-        others += _with_errors(ranking.laws) if not named and not adequacy.remedies else ""
-        none = f"none {tried} explains the tests{f' as they are stated; {named}' if named else ''}"
-        return f"{none}. The best, {best} ({weight}{others}), {adequacy_text(adequacy)}"
-    if "asked" in unmet and adequacy is not None and adequacy.explains:
-        more = len(ranking.further)
-        asked = len(ranking.laws) - more
-        found = f"of {more} more that were tried, {best} is not rejected by them ({weight})"
-        none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
-        errors = _with_errors([ranked for ranked in ranking.laws if ranked.fit.law.name not in ranking.further])
-        return f"{none} the tests{errors}; {found}: plan tests that can refute it"
-    if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {_of_best(ranking)}{lost}"
-        return f"{tried} these tests cannot tell apart {' and '.join(names)}; {found}"
-    if named and ranking.singled_out and adequacy is not None:
-        explains = f"is not rejected by the tests{qualification(adequacy)}"
-        return f"{tried} {best} has nearly all the weight ({weight}); it {explains}; but {named}"
-    others_unmet = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
-    return f"{tried} {best} is best ({weight}); {'; '.join([_of_best(ranking), *others_unmet])}"
->>>>>>> main

@@ -463,8 +463,8 @@ CHOICES = {
     "({weight}<, not told apart from {others:and}><; with {remedies:or}, which nobody modelled, {remedied} would "
     "explain them>), {left}",
     # a law that nobody asked for is not
-    "asked": "{none} the tests; of {further} more that were tried, {best} is not rejected by them ({weight}): plan "
-    "tests that can refute it",
+    "asked": "{none} the tests<; with {remedies:or}, which nobody modelled, {remedied} would explain them>; of "
+    "{further} more that were tried, {best} is not rejected by them ({weight}): plan tests that can refute it",
     # of several that were asked for
     "none asked": "none of the {asked} laws asked for explains",
     # of one
