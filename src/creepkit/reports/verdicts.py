@@ -37,7 +37,7 @@ from creepkit.reports.words import (
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
     from creepkit.inverse.explanation import Explanation
-    from creepkit.inverse.selection.ranking import RankedLaw, Ranking
+    from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.single_values import ContradictingValues
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
