@@ -17,7 +17,7 @@ BUDGET = {
     "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2151,
+    "cli": 2129,
     "composition": 411,
     "core": 67,
     "dataset": 713,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7021,
     "records": 2469,
     "registry": 615,
-    "reports": 6716,
+    "reports": 6700,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_073
+TESTS = 31_129
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
