@@ -32,7 +32,7 @@ import creepkit as ck
 from creepkit.errors import FitWarning
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.selection.ranking import ModelAverage
 from creepkit.inverse.variance_components import scaled_inverse
 
 

@@ -25,9 +25,8 @@ from creepkit.composition.regression import FEWEST_ALLOYS, CompositionRegression
 from creepkit.errors import FitError, refuse_unknown
 from creepkit.inverse.extrapolation import check_isothermal
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection.ranking import Ranking
+from creepkit.inverse.selection.ranking import ModelAverage, Ranking
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.uncertainty.quantities import (
     STATE_LIMITS,
     PointQuantity,

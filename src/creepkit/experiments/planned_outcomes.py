@@ -205,7 +205,7 @@ class UsualErrors(NamedTuple):
         of_ranking: bool,
     ) -> UsualErrors:  # fmt: skip
         """Those that intervals include, of some tests among others; of a ranking of laws lengths of each test alone."""
-        errors = [e for e in errors_of_tests(problem, linear.x, linear, noise_model, among) if e.included]
+        errors = [e for e in errors_of_tests(problem, linear, noise_model, among) if e.included]
         own = [e.residual_change for e in errors if not e.common and not (of_ranking and e.kind in (RATE, LIFE))]
         return cls(own, {e.kind: e.residual_change for e in errors if e.common and not of_ranking})
 

@@ -19,7 +19,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.extrapolation import check_isothermal
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.predictor_documents import registered_specimens
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage, WeightedLaws
+from creepkit.inverse.selection.ranking import ModelAverage, Ranking
 from creepkit.language import temperature
 from creepkit.records import History, Predictor, outputs_of
 from creepkit.records.presentable import Plotted, Presentable, Tabulated
@@ -75,7 +75,7 @@ class Forecast(Presentable, Plotted, Tabulated):
 
 @checked
 def forecast(
-    source: Identification | WeightedLaws | ModelAverage,
+    source: Identification | Ranking | ModelAverage,
     tests: History | Sequence[History],
     *,
     level: float = 0.95,
@@ -161,7 +161,7 @@ def _predictor(
     return resolved[history.specimen] if isinstance(resolved, Mapping) else resolved
 
 
-def _weighted_laws(source: Identification | WeightedLaws | ModelAverage) -> list[tuple[Identification, float]]:
+def _weighted_laws(source: Identification | Ranking | ModelAverage) -> list[tuple[Identification, float]]:
     """The laws that count, with weights that add up to one: those of least weight are left out."""
     average = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     ordered = sorted(zip(average.fits, average.weights, strict=True), key=lambda pair: -pair[1])

@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.kernels import ArrayKernel, lower
+from creepkit.kernels import ArrayKernel, lower, tension_point
 from creepkit.language import CreepLaw, stress, temperature
 from creepkit.language.law_record import expression_size
 from creepkit.language.symbols import POINT_VARIABLES
@@ -242,17 +242,9 @@ class Coordinates:
                 matrix[..., local.position, position] = -(da[..., k] + db[..., k] * theta[..., local.position]) / b
         return matrix
 
-    def _point(self, law: CreepLaw) -> list[float]:
+    def _point(self, law: CreepLaw) -> tuple[float, ...]:
         r = self.reference
-        return [
-            r.stress,
-            r.strain,
-            r.time,
-            r.temperature,
-            r.stress,
-            r.stress / 3,
-            *(z.initial for z in law.states.values()),
-        ]
+        return tension_point(law, r.stress, r.strain, r.time, r.temperature)
 
     def _has_finite_rate(self, kernel: ArrayKernel, rate_law: CreepLaw) -> bool:
         """Whether a virgin internal variable grows at all in the middle of the bounds."""

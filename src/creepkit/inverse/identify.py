@@ -43,8 +43,6 @@ from creepkit.inverse.noise_model import NoiseModel, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import nuisance_estimates_of
 from creepkit.inverse.nuisance_plausibility import implausible_nuisances
 from creepkit.inverse.perturbations import (
-    LIFE,
-    RATE,
     covariances_of_values_with_errors,
     errors_of_tests,
     perturbations,
@@ -221,7 +219,7 @@ def _law_of_determined(usual: StageEnd, end: StageEnd) -> CreepLaw:
     problem, linear = found.problem, found.linear
     noise = estimator.final(linear, found.noise, problem.parameter_count)
     working_noise = None if estimator.by_likelihood else estimator.weighting(found.noise)
-    errors, expected = errors_of_tests(problem, found.x, linear, noise), with_expected_scatter(problem, linear, noise)
+    errors, expected = errors_of_tests(problem, linear, noise), with_expected_scatter(problem, linear, noise)
     by_tests, of_errors, _ = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     u, covariance = np.split(found.x, [problem.parameter_count])[0], by_tests + of_errors
     to_theta = problem.coordinates.jacobian(u)
@@ -370,14 +368,12 @@ def _reported(
     u = x[:count]
     working_noise, errors, judged = None, best.errors, linear
     if not estimator.by_likelihood:
-        errors, judged = errors_of_tests(problem, x, linear, noise_model), judged_at(problem, linear, noise_model)
+        errors, judged = errors_of_tests(problem, linear, noise_model), judged_at(problem, linear, noise_model)
         working_noise = estimator.weighting(best.noise)
     expected = with_expected_scatter(problem, linear, noise_model)
-    unmodelled = perturbations(
-        problem, linear, expected, histories, [e for e in errors if e.kind not in (RATE, LIFE)], working_noise
-    )
+    unmodelled = perturbations(problem, linear, expected, histories, errors, working_noise)
     lengths = [e.residual_change for e in unmodelled if is_length_nuisance(e.kind) and not e.common]
-    rates = RateExplanations(problem, x, judged, noise_model)
+    rates = RateExplanations(problem, judged, noise_model)
     covariance, of_errors, of_common = covariances_of_values_with_errors(linear, expected, errors, working_noise)
     scatter = rate_scatter(problem, linear, noise_model, lengths, of_common)
     prediction = problem.predicted_by(problem.predictor, x, histories)

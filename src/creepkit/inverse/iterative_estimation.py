@@ -160,7 +160,7 @@ def at_reported_values(found: EstimationResult) -> EstimationResult:
         problem = problem.about_stopped_tests(linear.x, expected)
         residuals = problem.residuals(linear.x)
         linear = replace(problem.linearised(linear.x, residuals), free=free)
-        errors = errors_of_tests(problem, linear.x, linear, noise)
+        errors = errors_of_tests(problem, linear, noise)
         factor = CovarianceFactor.of_residuals(linear.with_errors(errors).residuals, expected)
         found = replace(found, problem=replace(problem, lengths={}), linear=linear, errors=errors)
         first = first or found

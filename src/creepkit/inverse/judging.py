@@ -133,7 +133,7 @@ class Judge:
                 continue
             freedom = share_of_freedom * float(mask.sum())
             reduced = float(judged.marginal[mask].sum()) / freedom
-            p_value = known.chance_of_larger(reduced, share_of_freedom, mask)
+            p_value = float(known.distribution(share_of_freedom, mask).sf(reduced))
             noise = float(np.median(known.sd[mask]))
             # In its unit from the deviations themselves: their share of chi-square is another where noise varies.
             square = float((judged.deviation[mask] ** 2).mean()) / share_of_freedom * max(1.0 - 1.0 / reduced, 0.0)
@@ -142,7 +142,8 @@ class Judge:
             outputs.append(OutputAdequacy(name, int(mask.sum()), noise, source, reduced, p_value, discrepancy))
         freedom = share_of_freedom * float(known.judged.sum())
         reduced = judged.reduced_chi_square(known.judged)
-        pooled = known.chance_of_larger(reduced, share_of_freedom, known.judged)
+        by_chance = known.distribution(share_of_freedom, known.judged)
+        pooled = float(by_chance.sf(reduced))
         p_values = [pooled, *(o.p_value for o in outputs)] if len(outputs) > 1 else [pooled]
         p_value = min(1.0, len(p_values) * min(p_values))
         # Outputs that are each within chance may be beyond it together: all of them have then left something.
@@ -157,8 +158,8 @@ class Judge:
             _correlation(self.noise_model),
             self._largest_deviation(judged),
             rate_scatter=self.noise_model.rate,
-            expected_chi_square=known.expected(share_of_freedom, known.judged),
-            critical_chi_square=known.critical(SIGNIFICANCE / len(p_values), share_of_freedom, known.judged),
+            expected_chi_square=float(by_chance.mean()),
+            critical_chi_square=float(by_chance.isf(SIGNIFICANCE / len(p_values))),
             smallest_p_value=min(p_values),
         )
 

@@ -66,44 +66,21 @@ class KnownNoise:
         """The same of some observations alone; mask : (tests, observations)."""
         return replace(self, judged=self.judged & mask)
 
-    def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
-        """The probability of a larger reduced chi-square by chance.
+    def distribution(self, share_of_freedom: float, mask: Bools) -> Any:
+        """That of the reduced chi-square of a law that is right, a frozen one of scipy.
 
-        mask : (tests, observations) the observations that it is of. share_of_freedom : degrees of freedom of each.
-        """
-        distribution, scale = self._distribution(share_of_freedom, mask)
-        return float(distribution.sf(reduced / scale))
-
-    def critical(self, chance: float, share_of_freedom: float, mask: Bools) -> float:
-        """The reduced chi-square that is exceeded with a probability `chance`: the inverse of chance_of_larger.
-
-        mask : (tests, observations) which count.
-        """
-        distribution, scale = self._distribution(share_of_freedom, mask)
-        return float(distribution.isf(chance) * scale)
-
-    def expected(self, share_of_freedom: float, mask: Bools) -> float:
-        """The mean reduced chi-square of a law that is right: one where noise is stated, that of F where estimated.
-
-        mask : (tests, observations) which count.
+        Each test has noise of its own. One test has the distribution of F, or of chi-square where its noise is stated;
+        the sum over several is taken as the scaled chi-square of the same mean and variance (Satterthwaite).
+        share_of_freedom : degrees of freedom of each observation. mask : (tests, observations) which count.
         """
         groups = self._groups(share_of_freedom, mask)
-        means = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
-        return means / max(sum(freedom for freedom, _ in groups), 1e-300)
-
-    def _distribution(self, share_of_freedom: float, mask: Bools) -> tuple[Any, float]:
-        """A distribution of scipy, and what the reduced chi-square of a right law is over a draw of it.
-
-        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
-        chi-square of the same mean and variance (Satterthwaite). mask : (tests, observations) which count.
-        """
-        groups = self._groups(share_of_freedom, mask)
-        total = sum(freedom for freedom, _ in groups)
-        if len(groups) == 1:
-            return _distribution_of_reduced(total, groups[0][1])
-        mean = total * self.expected(share_of_freedom, mask)
-        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
-        return chi2(2.0 * mean**2 / variance), variance / (2.0 * mean * total)
+        freedom = np.array([freedom for freedom, _ in groups])
+        each = [chi2(n, scale=1.0 / n) if np.isinf(nu) else f(n, nu) for n, nu in groups]
+        if len(each) == 1:
+            return each[0]
+        share = freedom / freedom.sum()
+        mean, variance = share @ [one.mean() for one in each], share**2 @ [one.var() for one in each]
+        return chi2(2.0 * mean**2 / variance, scale=variance / (2.0 * mean))
 
     def _groups(self, share_of_freedom: float, mask: Bools) -> list[tuple[float, float]]:
         """(degrees of freedom of chi-square, of its noise) of observations whose noise is one estimate."""
@@ -137,16 +114,3 @@ def _estimated_noise(history: History, name: str, values: Floats) -> Floats:
     exponent = float(np.clip(np.log(noises[1] / noises[0]) / np.log(sizes[1] / sizes[0]), 0.0, 1.0))
     level = float(np.sqrt(np.prod(noises)) / np.sqrt(np.prod(sizes)) ** exponent)
     return np.asarray(level * np.maximum(values, 1e-300) ** exponent)
-
-
-def _variance_of_f(freedom: float, noise_freedom: float) -> float:
-    """The variance of F, that of chi-square over its degrees of freedom where the noise is exactly known."""
-    if np.isinf(noise_freedom):
-        return 2.0 / freedom
-    nu = noise_freedom
-    return 2.0 * nu**2 * (freedom + nu - 2.0) / (freedom * (nu - 2.0) ** 2 * (nu - 4.0))
-
-
-def _distribution_of_reduced(freedom: float, noise_freedom: float) -> tuple[Any, float]:
-    """A distribution of scipy, and a scale of it: chi-square over its degrees of freedom, or F."""
-    return (chi2(freedom), 1.0 / freedom) if np.isinf(noise_freedom) else (f(freedom, noise_freedom), 1.0)

@@ -87,12 +87,21 @@ def perturbations(
 ) -> tuple[Perturbation, ...]:
     """Those that no nuisance parameter of the problem stands for, with what they do to the rate, about the optimum.
 
-    known : those of lengths and instruments, where they have been simulated already.
+    Errors that the tests have independently of one another, lengths, offsets, drifts; then those common to all. known :
+    as errors_of_tests() has them, where lengths have been simulated already.
     working_noise : under which values were found that are not by likelihood.
     """
     reference, found = problem.coordinates.reference, list[Perturbation]()
     slope = float(log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature))
-    for one in _all(problem, linear.x, linear, full_histories, known):
+    kinds = {n.kind for n in problem.settings.nuisances}
+    known = [e for e in known if e.kind not in (RATE, LIFE)] or of_lengths_and_instruments(problem, linear)
+    own, common = ([one for one in known if one.common is is_common] for is_common in (False, True))
+    own += [] if "offset" in kinds else _offsets(problem, linear)
+    recorded = any(isinstance(h.temperature, Program) for h in full_histories)
+    # A drift changes curves, and no single value.
+    if any(h.outputs for h in full_histories) and not recorded and kinds.isdisjoint({DRIFT, "rate drift"}):
+        own.append(_drift(problem, linear))
+    for one in (*own, *common):
         if one.common:
             one = replace(one, residual_change=np.zeros((0, 0)))
         elif not one.included:
@@ -123,43 +132,23 @@ def sizes_of_effect(
 # ---- what each does to the residuals ---------------------------------------------------------------------------------
 
 
-def _all(
-    problem: LeastSquaresProblem,
-    x: Floats,
-    linear: LinearisedProblem,
-    full_histories: Sequence[History],
-    known: Sequence[Perturbation],
-) -> Iterator[Perturbation]:
-    """Errors that the tests have independently of one another: lengths, offsets, drifts; then those common to all."""
-    kinds = {n.kind for n in problem.settings.nuisances}
-    known = known or of_lengths_and_instruments(problem, x, linear)
-    yield from (one for one in known if not one.common)
-    if "offset" not in kinds:
-        yield from _offsets(problem, linear)
-    recorded = any(isinstance(h.temperature, Program) for h in full_histories)
-    # A drift changes curves, and no single value.
-    if any(h.outputs for h in full_histories) and not recorded and kinds.isdisjoint({DRIFT, "rate drift"}):
-        yield _drift(problem, x, linear)
-    yield from (one for one in known if one.common)
-
-
 def of_lengths_and_instruments(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, among: int = 1
+    problem: LeastSquaresProblem, linear: LinearisedProblem, among: int = 1
 ) -> tuple[Perturbation, ...]:
     """Lengths that are off in each test by itself, errors common to all tests, and lengths that are off in all alike.
 
-    Those for which no nuisance parameter stands. x : (unknowns,). among : as in errors_of_tests().
+    Those for which no nuisance parameter stands. among : as in errors_of_tests().
     """
     own, common = list[Perturbation](), list[Perturbation]()
     kinds, included = {n.kind for n in problem.settings.nuisances}, problem.settings.included_errors
     for names, nominal, tolerances in uncertain_lengths(problem):
-        slope, sizes = _slope(problem, x, names[-1], nominal), included.get("dimensions", 1.0) * tolerances
+        slope, sizes = _slope(problem, linear.x, names[-1], nominal), included.get("dimensions", 1.0) * tolerances
         form: dict[str, Any] = {"tests": max(among, len(sizes)), "included": "dimensions" in included}
         form["residual_change"] = linear.residuals.offset_sensitivity * slope * sizes[:, None]
         found = Perturbation(names[-1], float(np.median(sizes)), "mm", **form)
         own += [found] if found.size > 0 and kinds.isdisjoint(names) else []
         common += [replace(found, common=True)] if found.size > 0 and found.tests > 1 else []
-    return (*own, *common_errors(problem, x, linear), *common)
+    return (*own, *common_errors(problem, linear), *common)
 
 
 def with_derivatives_to_lengths(problem: LeastSquaresProblem) -> LeastSquaresProblem:
@@ -169,19 +158,19 @@ def with_derivatives_to_lengths(problem: LeastSquaresProblem) -> LeastSquaresPro
     return replace(problem, lengths={names[-1]: nominal[None] for names, nominal, _ in uncertain_lengths(problem)})
 
 
-def common_errors(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[Perturbation]:
-    """Those of instruments that no nuisance parameter common to tests stands for; x : (unknowns,)."""
+def common_errors(problem: LeastSquaresProblem, linear: LinearisedProblem) -> list[Perturbation]:
+    """Those of instruments that no nuisance parameter common to tests stands for."""
     shared = {n.kind for n in problem.settings.nuisances if n.scope != "test"}
     included, rates = problem.settings.included_errors, linear.residuals.log_rate_sensitivity
-    per_kelvin, exponents = rate_slopes(problem, x).T[..., None]
+    per_kelvin, exponents = rate_slopes(problem, linear.x).T[..., None]
     effects = {"temperature": per_kelvin * rates, **({"load": exponents * rates} if exponents.any() else {})}
     moved = np.array([h.loading.quantity in IMPOSED for h in problem.histories])
     imposed = [h for h, is_moved in zip(problem.histories, moved, strict=True) if is_moved]
     if imposed:
         outputs = linear.residuals.offset_sensitivity * moved[:, None]
         if "modulus" not in shared and all(problem.predictor.for_history(h).follows("modulus") for h in imposed):
-            effects["modulus"] = outputs * _slope(problem, x, "modulus")
-        effects["motion"] = outputs * _motion_slope(problem, x)
+            effects["modulus"] = outputs * _slope(problem, linear.x, "modulus")
+        effects["motion"] = outputs * _motion_slope(problem, linear.x)
     made = []
     for name, size in {**USUAL_ERRORS, **included}.items():
         if name in effects and name not in shared and size > 0:
@@ -222,7 +211,7 @@ def _offsets(problem: LeastSquaresProblem, linear: LinearisedProblem) -> Iterato
             yield Perturbation(kind, size, unit, residual_change=change, tests=tests)
 
 
-def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> Perturbation:
+def _drift(problem: LeastSquaresProblem, linear: LinearisedProblem) -> Perturbation:
     """A furnace that drifts linearly over each test: the clock of the creep runs ahead.
 
     A factor 1 + b g(t) on the rate moves the clock by the integral of b g, and an output by that times its slope, as
@@ -236,7 +225,7 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
             history, times = problem.histories[test], observations.times[test, index]
             change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
     reference = problem.coordinates.reference
-    factor = log_rate_per_kelvin(problem, x, reference.stress, reference.temperature) * USUAL_DRIFT
+    factor = log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature) * USUAL_DRIFT
     change = factor * change * residuals.offset_sensitivity
     return Perturbation(DRIFT, USUAL_DRIFT, "K over a test", residual_change=change, tests=len(change))
 
@@ -366,9 +355,9 @@ to rupture."""
 
 
 def errors_of_tests(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, among: int = 1
+    problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel, among: int = 1
 ) -> tuple[Perturbation, ...]:
-    """Errors at x (unknowns,), of which those count that the settings include; none where they include none.
+    """Errors at the optimum, of which those count that the settings include; none where they include none.
 
     Those of lengths and instruments, then RATE and LIFE. among : how many tests there are, with others than these.
     """
@@ -380,11 +369,11 @@ def errors_of_tests(
     if tests > 1 and "rate" not in kinds:
         kelvin = 0.0 if "temperature" in kinds else included.get("temperature", 0.0)
         sizes = np.array([kelvin, included.get("load", 0.0)])
-        rates = np.linalg.norm(rate_slopes(problem, x) * sizes, axis=1)
+        rates = np.linalg.norm(rate_slopes(problem, linear.x) * sizes, axis=1)
         changes[RATE] = rates[:, None] * linear.residuals.log_rate_sensitivity
     made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
     own = [one for one in made if one.residual_change.any()]
-    return (*of_lengths_and_instruments(problem, x, linear, among), *own)
+    return (*of_lengths_and_instruments(problem, linear, among), *own)
 
 
 def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:

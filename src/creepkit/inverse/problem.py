@@ -43,7 +43,7 @@ from creepkit.inverse.search.local_refinement import Minimum, System, Tolerances
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.variance_components import BOUND_TOLERANCE, LinearisedProblem
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_single_value_weight
-from creepkit.kernels import lower
+from creepkit.kernels import lower, tension_point
 from creepkit.language import CreepLaw
 from creepkit.records import History, NuisanceValues, Prediction, Predictor
 from creepkit.records.conditions import stated_condition
@@ -395,8 +395,8 @@ class LeastSquaresProblem:
         stated = np.array([[stated_condition(h, one) for h in self.histories] for one in law.conditions], float)
         if not stated.size or not stated[..., 1].any():
             return None
-        point = (stress, reference.strain, reference.time, kelvin, stress, stress / 3)
-        given = (*point, *(state.initial for state in law.states.values()), *self.coordinates.theta(u))
+        point = tension_point(law, stress, reference.strain, reference.time, kelvin)
+        given = (*point, *self.coordinates.theta(u))
         steps = STATED_STEP * np.eye(len(stated))[..., None] * stated[..., 1]
         ends = [stated[:, None, :, 0] + side * np.moveaxis(steps, 0, 1) for side in (1, -1)]
         up, down = (lower(law, "numpy").internal_log_rate(*given, *end) for end in ends)

@@ -101,10 +101,10 @@ def are_numbers(label: str, entries: Iterable[str]) -> bool:
 
 
 class RateExplanations:
-    """The search for explanations of a problem at its optimum x (unknowns,), where it is made linear."""
+    """The search for explanations of a problem at its optimum, where it is made linear."""
 
-    def __init__(self, problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise: NoiseModel) -> None:
-        self.problem, self.x, self.free = problem, x, linear.free[: problem.parameter_count]
+    def __init__(self, problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> None:
+        self.problem, self.x, self.free = problem, linear.x, linear.free[: problem.parameter_count]
         held = replace(linear, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
         self.scatter = replace(rate_scatter(problem, linear, noise), members={})
         self.held = rate_scatter(problem, held, noise)  # beside heats, whose rates would hide what stresses say

@@ -151,6 +151,11 @@ class ArrayKernel:
         return [log(numbers[n]) if p.scale == "log" else numbers[n] for n, p in self.law.table.items()]
 
 
+def tension_point(law: CreepLaw, stress: Any, strain: Any, time: Any, temperature: Any) -> tuple[Any, ...]:
+    """What precedes the parameters in methods that begin with `internal`: simple tension, states as they begin."""
+    return stress, strain, time, temperature, stress, stress / 3.0, *(s.initial for s in law.states.values())
+
+
 @lru_cache(maxsize=256)
 def _array_kernel(law: CreepLaw, target: KernelTarget) -> ArrayKernel:
     return ArrayKernel(symbolic_kernel(law), import_module(f"creepkit.kernels.{target}_functions"))

@@ -11,11 +11,11 @@ from creepkit.reports.identification import correlation_table
 
 if TYPE_CHECKING:
     from creepkit.inverse.cross_validation import CrossValidation
+    from creepkit.inverse.selection.ranking import ModelAverage
     from creepkit.inverse.single_values import SingleValue
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.correlation import Correlation
     from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
-    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
 
 # ---- term selection --------------------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ import sympy
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, nearest
 from creepkit.files.record_codec import RecordCodec, ValueCodec
+from creepkit.kernels import tension_point
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
@@ -83,12 +84,11 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
     parameters = [column[:, None] for column in draws.parameters.T]
     stress, strain = np.full((len(draws), TIME_FRACTIONS.size), CONSTRAINT_STRESS), CONSTRAINT_STRAIN
     temperature = draws.condition("temperature", ROOM_TEMPERATURE)[:, None]
-    arguments = (stress, strain, TIME_FRACTIONS * end_times[:, None], temperature, stress, stress / 3.0)
-    states = [state.initial for state in law.states.values()]
+    point = tension_point(law, stress, strain, TIME_FRACTIONS * end_times[:, None], temperature)
     holds = np.ones(len(draws), bool)
     for function in constraint_functions(law):
         with np.errstate(all="ignore"):
-            satisfied = np.broadcast_to(function(*arguments, *states, *parameters), stress.shape)
+            satisfied = np.broadcast_to(function(*point, *parameters), stress.shape)
         holds &= satisfied.all(axis=1)
     return holds
 

@@ -20,7 +20,7 @@ from scipy.special import gammaincinv, logsumexp
 
 from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen, set_fields
 from creepkit.errors import DatasetError, nearest
-from creepkit.kernels import lower
+from creepkit.kernels import lower, tension_point
 from creepkit.language import CreepLaw, time
 from creepkit.records import ROOM_TEMPERATURE, History, Specimen
 from creepkit.sampling.conditions import (
@@ -168,16 +168,8 @@ def ln_rate(
         initial values.
     """
     stress = np.asarray(arguments.stress, float)
-    states = [state.initial for state in law.states.values()] if states is None else states
-    variables: list[Any] = [
-        stress,
-        arguments.strain,
-        arguments.time,
-        arguments.temperature,
-        stress,
-        stress / 3.0,
-        *states,
-    ]
+    point = tension_point(law, stress, arguments.strain, arguments.time, arguments.temperature)
+    variables = point if states is None else (*point[: len(point) - len(states)], *states)
     shape = np.broadcast_shapes(theta.shape[:-1], *(np.shape(v) for v in variables))
     columns = [np.broadcast_to(np.asarray(v, float), shape) for v in (*variables, *np.moveaxis(theta, -1, 0))]
     return np.asarray(lower(law, "numpy").internal_log_rate(*columns), float)

@@ -29,7 +29,6 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.predictor_documents import history_text, predictor_fingerprint, short_hash
 from creepkit.inverse.reference_conditions import with_arrhenius
-from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.jobs.progress import ProgressCallback, duration_text
@@ -76,7 +75,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         failed_laws=dict(ranking.failed),
         verdict=ranking.verdict,
         decisive=ranking.decisive,
-        equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
+        equivalents=tuple(str(pair) for pair in ranking.equivalents()),
         dense_fit=dense,
         notes=(*notes, *best.remarks),
     )

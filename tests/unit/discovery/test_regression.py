@@ -7,7 +7,7 @@ from creepkit import registry
 from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
 from creepkit.discovery.forms import candidate_forms, evaluate_forms
 from creepkit.discovery.regression import regress
-from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
+from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
 from helpers.temperature_estimates import NINE, T_REF, arrhenius_line, conditioned, points

@@ -13,8 +13,7 @@ from creepkit.forecasts.banded_output import band_of_draws
 from creepkit.forecasts.draws import law_draws
 from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.output_transforms import LinearTransform
-from creepkit.inverse.selection.ranking import ranking_from_scores
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.selection.ranking import ModelAverage, ranking_from_scores
 from creepkit.records import Status
 from creepkit.reports.answer import asked_figures
 from creepkit.reports.documents import document

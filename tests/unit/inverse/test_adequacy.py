@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.judging import Judge
-from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, KnownNoise
+from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import frame_noise
@@ -204,17 +204,6 @@ def test_without_any_noise_nothing_can_be_judged():
     assert "in Python as standard_deviation" in str(found)
     assert f"too few readings of '{tests[0].name}' (5)" in str(found)
     assert "fewer than 30 readings of a test cannot judge" in str(found)
-
-
-# ---- sentences ---------------------------------------------------------------------------------------------------
-
-
-def test_the_critical_chi_square_is_exceeded_with_the_probability_that_it_is_for():
-    for freedom in ([np.inf, np.inf], [8.0], [8.0, 8.0, 12.0], [np.inf, 8.0]):
-        mask = np.ones((len(freedom), 40), bool)
-        known = KnownNoise(mask, np.ones(mask.shape), np.repeat(np.array(freedom)[:, None], 40, axis=1))
-        critical = known.critical(0.003, 0.95, mask)
-        assert known.chance_of_larger(critical, 0.95, mask) == pytest.approx(0.003, rel=1e-6)
 
 
 # ---- residuals -------------------------------------------------------------------------------------------------------

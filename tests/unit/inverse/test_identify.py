@@ -18,7 +18,7 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import frame_noise
 from creepkit.inverse.selection import rank
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.selection.ranking import ModelAverage
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON

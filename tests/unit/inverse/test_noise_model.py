@@ -196,12 +196,11 @@ def test_stated_noise_is_known_exactly_and_short_tests_are_not_judged():
 def test_one_test_has_the_distribution_of_f_and_several_about_the_nominal_chance():
     """Nine tests of 60 white frames, each over its own variance of 12 degrees of freedom; 1 % of 4000 draws."""
     one = KnownNoise(np.ones((1, 60), bool), np.ones((1, 60)), np.full((1, 60), 12.0))
-    assert one.chance_of_larger(1.5, 0.9, one.judged) == pytest.approx(f.sf(1.5, 54.0, 12.0))
+    assert one.distribution(0.9, one.judged).sf(1.5) == pytest.approx(f.sf(1.5, 54.0, 12.0))
     nine = KnownNoise(np.ones((9, 60), bool), np.ones((9, 60)), np.full((9, 60), 12.0))
     rng = np.random.default_rng(0)
     draws = (rng.chisquare(60, (4000, 9)) / 60 / (rng.chisquare(12, (4000, 9)) / 12)).mean(axis=1)
-    alarms = np.mean([nine.chance_of_larger(float(value), 1.0, nine.judged) < 0.01 for value in draws])
-    assert alarms < 0.025
+    assert np.mean(nine.distribution(1.0, nine.judged).sf(draws) < 0.01) < 0.025
 
 
 # ---- working noise ---------------------------------------------------------------------------------------------------

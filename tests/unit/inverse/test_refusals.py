@@ -13,9 +13,9 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.selection import rank
+from creepkit.inverse.selection.ranking import ModelAverage
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.correlation import correlation
-from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, PressureJump, Status, StressSteps, constant_stress
 from helpers.steady_rate_predictor import Steady, planted

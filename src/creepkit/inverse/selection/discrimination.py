@@ -35,7 +35,6 @@ from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample
 from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.nuisance_parameters import Perturbation
 from creepkit.inverse.sparsity.term_selection import DIFFERENCE_STEP, TermContributions
-from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, strain, time
@@ -204,9 +203,8 @@ class EquivalentLaws:
         return self.sentence
 
 
-def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
-    """The pairs of a ranking's laws that its tests cannot separate, nearest predictions first."""
-    fits = [r.fit for r in ranking.laws]
+def equivalent_laws(fits: Sequence[Identification]) -> tuple[EquivalentLaws, ...]:
+    """The pairs of laws, the better one first, that their tests cannot separate, nearest predictions first."""
     whitened = under_common_covariance(fits).whitened
     pairs = []
     for a, b in combinations(range(len(fits)), 2):

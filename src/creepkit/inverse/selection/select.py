@@ -223,6 +223,8 @@ def with_hold_tried(fit: Identification) -> Identification:
     scatters = adequacy is not None and adequacy.rate_scatter > LARGE_SCATTER
     if adequacy is None or not (adequacy.misses_shape() or scatters) or adequacy.is_explained or fit.predictor is None:
         return fit
+    if any(remedy.kind == "control" for remedy in adequacy.remedies):
+        return fit  # tried before
     others = [held_otherwise(history.loading) for history in fit.histories]
     held = {other[1] for other in others if other is not None}
     if None in others or len(held) != 1 or max(map(_largest_strain, fit.histories)) < LEAST_STRAIN:

@@ -48,7 +48,7 @@ from creepkit.inverse.search.local_refinement import IterationCallback, Minimum,
 from creepkit.inverse.search.multistart import StartingEstimate
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity, TermNames
-from creepkit.kernels import lower
+from creepkit.kernels import lower, tension_point
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, growing_output, is_logarithmic, output_named
 
@@ -310,8 +310,7 @@ class TermContributions:
         if not loaded:
             raise FitError("no test is ever under load: terms of a law cannot be weighed against one another")
         self.weight = np.concatenate([np.full(p.shape[1], 1.0 / (len(loaded) * p.shape[1])) for p in loaded])
-        stress, *others = np.concatenate(loaded, axis=1)
-        self.point = (stress, *others, stress, stress / 3.0)
+        self.point = np.concatenate(loaded, axis=1)
         self.terms = [(law, lower(law, "numpy")) for law in map(self.law.only, self.law.terms)]
 
     @classmethod
@@ -324,9 +323,8 @@ class TermContributions:
         theta = self.coordinates.theta(u[: len(self.law.params)])
         log_rates = np.empty((self.weight.size, len(self.terms)))
         for k, (term, kernel) in enumerate(self.terms):
-            states = [state.initial for state in term.states.values()]
             columns = [theta[self.law.names.index(name)] for name in term.names]
-            log_rates[:, k] = kernel.internal_log_rate(*self.point, *states, *columns)
+            log_rates[:, k] = kernel.internal_log_rate(*tension_point(term, *self.point), *columns)
         return log_rates
 
     def log_rate(self, u: Floats) -> Floats:

@@ -48,7 +48,7 @@ def predicted_errors(fit: Identification, alone: CovarianceFactor) -> Floats:
     """
     problem, noise = fit.least_squares_problem, fit.noise_model
     linear = problem.linearised(fit.x)
-    residuals = linear.with_errors(errors_of_tests(problem, fit.x, linear, noise)).residuals
+    residuals = linear.with_errors(errors_of_tests(problem, linear, noise)).residuals
     whole = CovarianceFactor.of_residuals(residuals, with_expected_scatter(problem, linear, noise))
     rest = (alone.blocks @ whole.inverse_times(residuals.values)[..., None])[..., 0]
     return np.where(residuals.present, residuals.values - rest, 0.0)

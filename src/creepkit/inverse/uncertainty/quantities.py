@@ -186,7 +186,7 @@ def log_rate(
     stress, temperature, strain, time : numbers or arrays that broadcast to (points,), in MPa, K, - and s; what is not
     given is that of the reference point.
     """
-    from creepkit.kernels import lower
+    from creepkit.kernels import lower, tension_point
 
     law, reference = coordinates.law_there, coordinates.reference
     kernel = lower(law, "numpy")
@@ -194,13 +194,12 @@ def log_rate(
     check_state(stated)
     given = ((value, getattr(reference, name)) for name, value in stated.items())
     point = np.broadcast_arrays(*(np.asarray(default if v is None else v, float) for v, default in given))
-    initial_states = [z.initial for z in law.states.values()]
-    shape = point[0].shape
+    point, shape = tension_point(law, *point), point[0].shape
 
     def function(u: Floats) -> Floats:
         theta = coordinates.theta(u)
         columns = np.moveaxis(theta.reshape(*theta.shape, *(1 for _ in shape)), theta.ndim - 1, 0)
-        out = kernel.internal_log_rate(*point, point[0], point[0] / 3, *initial_states, *columns)
+        out = kernel.internal_log_rate(*point, *columns)
         return np.asarray(out + np.zeros((*theta.shape[:-1], *shape)), float)
 
     return function

@@ -21,7 +21,6 @@ from creepkit.inverse.selection.challenges import (
     challenges_of,
     share_residual,
 )
-from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.selection.ranking import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Param, arrhenius, stress
@@ -288,7 +287,7 @@ def hardening():
 
 
 def test_hardening_by_strain_and_by_time_are_one_law_at_constant_stress(hardening):
-    (found,) = equivalent_laws(hardening)
+    (found,) = hardening.equivalents()
     assert {found.first, found.second} == {"strain-hardening", "time-hardening"}
     assert found.chi_square < 1e-3
     assert "no test changes its load" in str(found)
@@ -309,11 +308,11 @@ def test_and_the_fitted_values_obey_the_identity(hardening):
 def test_after_a_change_of_stress_they_are_two():
     loadings = [*HELD[:2], StressSteps(((0.0, 40.0), (0.5 * END, 60.0)), "stress")]
     tests = bars(STRAIN_HARDENING, SPL, loadings, seed=0)
-    assert equivalent_laws(ranking((STRAIN_HARDENING, TIME_HARDENING), tests)) == ()
+    assert ranking((STRAIN_HARDENING, TIME_HARDENING), tests).equivalents() == ()
 
 
 def test_a_power_law_is_also_a_sinh_and_a_hardening_that_does_not_harden():
-    found = pairs(equivalent_laws(ranking((STRAIN_HARDENING, HYPERBOLIC_SINE, NORTON), bars(NORTON, PL, HELD, seed=0))))
+    found = pairs(ranking((STRAIN_HARDENING, HYPERBOLIC_SINE, NORTON), bars(NORTON, PL, HELD, seed=0)).equivalents())
     nested = found[frozenset(("norton", "strain-hardening"))]
     assert nested.reduction == "m = 0"
     assert "strain-hardening with m = 0 is the other law, and the tests allow it" in nested.sentence
@@ -330,4 +329,4 @@ def test_over_a_wide_range_of_stress_a_sinh_is_no_power_law():
     tests = planted(HYPERBOLIC_SINE, values, conditions, seed=1, noise=1e-5)
     quick = IdentificationSettings(starts=3, sobol_points=16, frames=20, weights="likelihood", nuisances=())
     fits = [identify(law, tests, Steady(), settings=quick) for law in (HYPERBOLIC_SINE, NORTON)]
-    assert equivalent_laws(rank(fits)) == ()
+    assert rank(fits).equivalents() == ()

@@ -12,10 +12,11 @@ from scipy.stats import norm
 import creepkit as ck
 from creepkit.errors import ArgumentError, FitError
 from creepkit.inverse.identify import identify
+from creepkit.inverse.selection.ranking import ModelAverage
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.correlation import correlation, undetermined
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, cut_intervals, verdict_of_interval
-from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage
+from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.reports.remarks import remarks
