@@ -43,6 +43,7 @@ BENCHMARKS = {
     "import_time": Benchmark(0.1),
     "page_latency": Benchmark(1, needs="Chromium and playwright"),
     "core_speed": Benchmark(2),
+    "neon": Benchmark(15, needs="Debian, with qemu-user and gcc"),
     "random_simulations": Benchmark(
         30, (("--cases", "40000"),), short=("--cases", "1000", "--laws", "10", "--seed", "7", "--jobs", "2")
     ),
