@@ -15,12 +15,11 @@ from creepkit.errors import FitError
 from creepkit.forecasts.banded_output import CHOICE_OF_LAW, LAW
 from creepkit.forecasts.draws import MISFIT_THERE
 from creepkit.inverse.reference_conditions import usable_frames
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
 from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
-from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
 from creepkit.reports.words import FORECAST
@@ -175,35 +174,6 @@ def end_shares(one: OutputForecast | None) -> dict[str, float]:
         return {}
     shares = {part: float(values[alive[-1]]) for part, values in one.shares.items()}
     return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
-
-
-def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
-    """The forecast as JSON-able data: s and the units of the outputs; null for what is infinite or not known."""
-    return {
-        **fields_to_json(forecast, "laws level rejected"),
-        "tests": [_test_to_json(test) for test in forecast.tests],
-    }
-
-
-def _test_to_json(test: TestForecast) -> dict[str, Any]:
-    return {
-        "name": test.name,
-        "condition": test.history.condition,
-        "outputs": {
-            name: {
-                "time": finite(one.times),
-                "value": finite(one.value),
-                **fields_to_json(one.band, "median low high lowest highest"),
-                "unit": output_unit(one.output),
-                "shares": finite(one.shares),
-            }
-            for name, one in test.outputs.items()
-        },
-        "times": [fields_to_json(one, "event value median low high chance measured censored") for one in test.times],
-        **fields_to_json(test, "includes extrapolation notes caution"),
-        "misfit": test.misfit and fields_to_json(test.misfit, "factor stress temperature log_factor"),
-        "inside": None if test.inside is None else fields_to_json(test.inside, "share whole"),
-    }
 
 
 # ---- figure ----------------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
 from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of
 from creepkit.reports.condition_colours import ColourScale
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
-from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.words import RUPTURE
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
@@ -223,43 +221,6 @@ def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
 def _pair(ends: tuple[float | None, float | None], digits: str = ".1f") -> str:
     low, high = ("none" if end is None else f"{end:{digits}}" for end in ends)
     return f"[{low}, {high}]" if (low, high) != ("none", "none") else "none"
-
-
-def rupture_to_json(assessment: RuptureAssessment) -> dict[str, Any]:
-    """The assessment as JSON-able data, without the tests and covariances that its file holds."""
-    relation = assessment.relation
-    return {
-        "verdict": assessment.verdict,
-        "decisive": assessment.decisive,
-        "tests": len(assessment.tests),
-        "run_outs": int(assessment.tests.censored.sum()),
-        "methods": [{**_fit_to_json(r.fit), "bic_excess": r.excess, "weight": r.weight} for r in assessment.ranked],
-        "rejected": dict(assessment.rejected),
-        "relation": relation and [_fit_to_json(relation.times), _fit_to_json(relation.rates)],
-        "strengths": [
-            {
-                "strength": one.value,
-                **fields_to_json(one, "method hours temperature bounds_of_mean bounds_of_heat bounds_of_test"),
-                **fields_to_json(one, "extrapolation reason"),
-            }
-            for one in assessment.strengths
-        ],
-        "lives": finite([asdict(one) for one in assessment.lives]),
-        "checks": [fields_to_json(one, "name passed found fault") for one in assessment.checks],
-        "level": assessment.settings.level,
-        "notes": list(assessment.notes),
-        "provenance": dict(assessment.provenance),
-    }
-
-
-def _fit_to_json(fit: RuptureFit) -> dict[str, Any]:
-    return {
-        **fields_to_json(fit, "method degree fixed log_likelihood"),
-        "parameters": {p.name: fields_to_json(p, "value low high unit") for p in fit.parameters},
-        "scale_log10": fit.scale,
-        "scatter_log10": dict(fit.scatter),
-        "effects_log10": {group: dict(effects) for group, effects in fit.effects.items()},
-    }
 
 
 # ---- figure ----------------------------------------------------------------------------------------------------------

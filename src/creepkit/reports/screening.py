@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +12,7 @@ from creepkit.reports.blocks import Paragraph, as_text
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_size
 from creepkit.reports.remarks import numerical_error_text
-from creepkit.screening.results import AlloyResult, result_columns
+from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,14 +97,3 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
     """Mean weight of a law over the members that are decisive, or over those that are not, as a share of all."""
     weights = [w.weight for m in members if m.decisive is decisive for w in m.laws if w.fit.law.name == law]
     return sum(weights) / len(members)
-
-
-def plate_to_json(plate: ScreeningResult, written: Sequence[Path]) -> dict[str, Any]:
-    """Columns of each alloy, shares of laws by class, what failed, and the files that were written."""
-    return {
-        "alloys": [result_columns(plate, result) for result in plate.results],
-        "shares": plate.law_fractions(),
-        "failed": plate.failures,
-        "notes": list(plate.notes),
-        "files": [str(path) for path in written],
-    }

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -211,22 +210,3 @@ def modulus_estimates_text(estimates: ModulusEstimates) -> str:
     lines = [f"  {name}: {E / 1e3:.1f} +- {sd / 1e3:.1f} GPa at {T:.1f} K" for name, T, E, sd in rows]
     form = estimates.elastic.E if estimates.elastic else "-"
     return "\n".join(["modulus from the first frames", *lines, f"  E(T) = {form}"])
-
-
-def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
-    """The result and the files that were written, as JSON-able data."""
-    law = temperature_law
-    return {
-        "law": law.law.name,
-        "judged_by": law.criterion_data,
-        "range_K": list(law.temperature_range),
-        "T_ref_K": law.T_ref,
-        "forms": law.forms,
-        "sets": {name: [vars(one) for one in weights] for name, weights in law.plausible_forms.items()},
-        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in law.estimates},
-        "candidates": [
-            {"forms": one.forms, "excess": one.criterion_difference, "weight": one.weight} for one in law.candidates
-        ],
-        "notes": list(law.notes),
-        "files": [str(path) for path in written],
-    }
