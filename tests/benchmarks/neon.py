@@ -138,7 +138,7 @@ class Machine:
         compiler = f"{sys.executable};-m;ziglang;c++;-target;aarch64-linux-gnu.2.28"
         options = ["CMAKE_SYSTEM_NAME=Linux", "CMAKE_SYSTEM_PROCESSOR=aarch64", f"CMAKE_CXX_COMPILER={compiler}"]
         options += [f"CREEPKIT_OUTPUT={self.library.parent.resolve()}", "CMAKE_BUILD_TYPE=Release"]
-        options.append("CMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY")  # or each try compiles a C++ library for arm64
+        options.append("CMAKE_CXX_FLAGS=-nostdlib++")  # or CMake's first question compiles a C++ library for arm64
         environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
         defined = [f"-D{option}" for option in options]
         run("cmake", "-S", ROOT / "src/core", "-B", build, *defined, env=environment)
