@@ -9,6 +9,7 @@ from creepkit.inverse.selection import rank
 from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.laws.norton import NORTON
 from creepkit.reports import words
+from creepkit.reports.blocks import Answer
 from helpers.log_rate_predictor import known_scatter, measured
 
 RECORDS = [Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2))]
@@ -29,3 +30,13 @@ def test_every_text_of_an_answer_is_short_and_says_when_it_is_said() -> None:
     assert [
         one for k in texts for one in re.split("[;:] ", lines[k].partition('": ')[2]) if len(one.split()) > 25
     ] == []
+
+
+def test_a_figure_holds_at_a_condition_or_over_all_tests() -> None:
+    figures = [
+        ("stress exponent", "over all tests, 60–250 MPa", "9 [8, 10]", ""),
+        ("creep rate", "80 MPa", "2 %/h", ""),
+    ]
+    lines = str(Answer("norton", "27 tests", figures=figures)).splitlines()
+    assert "  stress exponent over all tests, 60–250 MPa: 9 [8, 10]" in lines
+    assert "  creep rate at 80 MPa: 2 %/h" in lines
