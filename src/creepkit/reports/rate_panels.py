@@ -266,7 +266,7 @@ MOST_LAWS = 10
 
 
 WIDTH, PAGE_WIDTH, ROW, LARGEST = 8.6, 5.8, 0.115, 11.0
-"""Inches of the figure, of one that a telephone shows as it was drawn, of a material in it, and of its height at most."""
+"""Inches of the figure, of one on a page for telephones too, of a material in it, and of its height at most."""
 
 
 def plate_size(materials: int) -> tuple[float, float]:
