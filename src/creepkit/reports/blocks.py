@@ -172,7 +172,7 @@ class Answer:
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
     more: str = ".details()"
-    units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
+    units: str = "true stress/MPa, time/s, strain as a fraction"
     brackets: str = ""
     codes: str = ""
     role: str = ""

@@ -151,11 +151,17 @@ def block_shown(block: Block, names: LawNames) -> Block:
     return block
 
 
+AT_BOUND = " (search bound)"
+"""Behind an end of an interval, where a page has room for no more than a sign before it."""
+
+
 def _value_shown(value: str, ends: Sequence[str]) -> str:
     """A value, with its interval where that is all that is known, or that it lies at a bound of its search."""
     if not value.startswith("="):
-        return f"{value} [{', '.join(ends)}]"
-    return f"{value}{' (at the bound of its search)' * (f'{value[2:]} (search bound)' in ends)}"
+        known = [end.removesuffix(AT_BOUND) for end in ends]
+        marks = ["≤ " * (ends[0] != known[0]), "≥ " * (ends[1] != known[1])]
+        return f"{value} [{', '.join(map(''.join, zip(marks, known, strict=True)))}]"
+    return f"{value}{' (at the bound of its search)' * (f'{value[2:]}{AT_BOUND}' in ends)}"
 
 
 # ---- findings --------------------------------------------------------------------------------------------------------
