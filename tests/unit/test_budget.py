@@ -17,7 +17,7 @@ BUDGET = {
     "api": 288,
     "app": 596,
     "cameras": 823,
-    "cli": 2151,
+    "cli": 2129,
     "composition": 411,
     "core": 67,
     "dataset": 713,
@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 790,
-    "inverse": 9437,
+    "inverse": 9438,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7035,
     "records": 2469,
     "registry": 615,
-    "reports": 6713,
+    "reports": 6682,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_230
+TESTS = 31_295
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

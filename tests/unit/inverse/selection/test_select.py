@@ -9,7 +9,7 @@ import sympy
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy, Remedy
 from creepkit.inverse.evidence import occam_penalty
 from creepkit.inverse.identify import identify
 from creepkit.inverse.noise_covariance import CovarianceFactor
@@ -233,6 +233,12 @@ def test_decisive_is_a_law_asked_for_that_explains_has_the_weight_and_stands_eve
     lost = Ranking(tuple(RankedLaw(fit(name, converged=False), 0.0, 0.5) for name in ("norton", "sinh")), challenges=())
     assert "did not converge" in lost.verdict
     assert [why for why, one in short.items() if one.decisive or one.verdict.startswith("decisive")] == []
+
+
+def test_a_further_law_is_said_beside_the_error_with_which_one_that_was_asked_for_would_explain_the_tests():
+    drift = Remedy("temperature drift", "a temperature drift of 9 K over a test", is_usual=False)
+    found = ranking_of([0.99, 0.01], [EXPLAINS, replace(LEFT, remedies=(drift,))], further=("norton",)).verdict
+    assert f"with {drift.description}, which nobody modelled, sinh would explain them; of 1 more" in found
 
 
 # ---- rankings ----------------------------------------------------------------------------------------------------
