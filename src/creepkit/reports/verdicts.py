@@ -324,7 +324,7 @@ def _reason(ranking: Ranking) -> str:
     remedied = "" if kind == "none" and (own or refuted) else next(iter(found), "")
     asked, lost = len(ranking.laws) - len(ranking.further), words.UNMET["convergence"] * ("convergence" in unmet)
     others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
-    texts = {"left": adequacy_text, "explanation": explanation_text, "qualified": qualification, "cause": _cause}
+    texts = {"explanation": explanation_text, "qualified": qualification, "cause": _cause}
     of_adequacy = {name: "" if adequacy is None else text(adequacy) for name, text in texts.items()}
     return say(
         words.CHOICES[kind],

@@ -467,9 +467,9 @@ CHOICES = {
     # what the best law misses lies in tests
     "in tests": "of {count} laws tried {best} is best ({weight}), but {cause}: {explanation}",
     # the best law is rejected
-    "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best, {best} "
+    "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best is {best} "
     "({weight}<, not told apart from {others:and}><; with {remedies:or}, which nobody modelled, {remedied} would "
-    "explain them>), {left}",
+    "explain them>); {verdict}",
     # a law that nobody asked for is not
     "asked": "{none} the tests<; with {remedies:or}, which nobody modelled, {remedied} would explain them>; of "
     "{further} more that were tried, {best} is not rejected by them ({weight}): plan tests that can refute it",
@@ -552,7 +552,7 @@ PERTURBATIONS = {
     # of temperature, of one test
     "drift": "a linear drift of {one.size:.2g} K over the test",
     # of several
-    "drifts": "independent drifts of the temperature, {one.size:.2g} K over each of {one.tests} tests",
+    "drifts": "independent drifts of temperature, {one.size:.2g} K over each of {one.tests} tests",
     # of what is stated or read, of one test
     "error": "an {error} of {one.amount} in the {what} of the test",
     # of several
