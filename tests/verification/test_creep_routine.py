@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.exporters.creep_subroutine import ABAQUS_CREEP, CALCULIX_CREEP
 from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, states, strain, stress
 from creepkit.records import LawWithValues, Program, Units
 from helpers.compiled_fortran import Routine
@@ -73,13 +73,13 @@ def routines(tmp_path_factory, gfortran):
     folder = tmp_path_factory.mktemp("creep")
     made = {}
 
-    def routine(name, exporter=AbaqusCreepSubroutine, **how):
+    def routine(name, exporter=ABAQUS_CREEP, **how):
         key = (name, exporter.name, *map(str, how.items()))
         if key not in made:
             law, values = CASES[name]
             place = folder / f"r{len(made)}"
             place.mkdir()
-            text = exporter().text(LawWithValues(law, values, name="mine", **how))
+            text = exporter.text(LawWithValues(law, values, name="mine", **how))
             made[key] = Routine(gfortran, text, place, f"mine{len(made)}")
         return made[key]
 
@@ -163,7 +163,7 @@ def test_a_state_that_falls_ends_at_its_limit(tmp_path, gfortran):
     law = CreepLaw(
         name="falls", terms={"term": A * stress**n / omega}, params={A: RATE, B: RATE, n: POWER}, states=falls
     )
-    text = AbaqusCreepSubroutine().text(LawWithValues(law, {"A": 1e-16, "B": 1e-4, "n": 4.0}))
+    text = ABAQUS_CREEP.text(LawWithValues(law, {"A": 1e-16, "B": 1e-4, "n": 4.0}))
     routine, inner = Routine(gfortran, text, tmp_path, "falls"), np.zeros(10)
     found, _ = routine.creep(60.0, 0.0, 5e3, 5e3, states=inner)
     assert found[0] == pytest.approx(1e-16 * 60.0**4 * np.expm1(0.5) / 1e-4, rel=5e-3)
@@ -179,7 +179,7 @@ def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path,
         "growth", {"term": B * (omega + c)}, {B: RATE, c: POWER}, states={omega: State(0.0, B * (omega + c))}
     )
     routine, inner = (
-        Routine(gfortran, AbaqusCreepSubroutine().text(LawWithValues(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
+        Routine(gfortran, ABAQUS_CREEP.text(LawWithValues(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
         np.zeros(10),
     )
     found, _ = routine.creep(60.0, 0.0, folds / 1e-4, folds / 1e-4, states=inner)
@@ -211,7 +211,7 @@ def test_the_derivatives_are_those_of_the_update(name, creep, routines):
 
 def test_the_derivative_to_the_pressure(tmp_path, gfortran):
     law = CreepLaw("mean", {"term": A * (stress + 0.5 * mean_stress) ** n}, {A: RATE, n: POWER})
-    text = AbaqusCreepSubroutine().text(LawWithValues(law, {"A": 1e-16, "n": 4.0}, units=Units("Pa", "h")))
+    text = ABAQUS_CREEP.text(LawWithValues(law, {"A": 1e-16, "n": 4.0}, units=Units("Pa", "h")))
     routine = Routine(gfortran, text, tmp_path, "mean")
     found = [routine.creep(70e6, 0.0, 2.0, 2.0, pressure=p)[0] for p in (-30e6, -30e6 + 1e3, -30e6 - 1e3)]
     assert found[0][0] == pytest.approx(1e-16 * 85.0**4 * 7200.0, rel=1e-12)
@@ -227,7 +227,7 @@ def test_pascal_and_hours_give_the_same_strain(name, routines):
 
 def test_temperature_steps_agree_with_the_integrator(tmp_path, gfortran):
     law, values = ck.law("norton").times(ck.arrhenius(T_ref=1000.0)), {"A": 1e-16, "n": 4.0, "Q": 3e5}
-    routine = Routine(gfortran, AbaqusCreepSubroutine().text(LawWithValues(law, values)), tmp_path, "warm")
+    routine = Routine(gfortran, ABAQUS_CREEP.text(LawWithValues(law, values)), tmp_path, "warm")
     ramp = (np.array([0.0, 2e4, 2.2e4, END]), np.array([1000.0, 1000.0, 1080.0, 1080.0]))
     exact = reference(law, values, temperature=Program(*ramp))
     errors = [abs(marched(routine, count, warm=ramp)[0] / exact - 1) for count in (150, 300, 600)]
@@ -273,7 +273,7 @@ def relaxed(routine, E, total, count):
 
 
 def test_calculix_is_given_the_stress_for_an_increment_where_elasticity_is_anisotropic(routines):
-    routine = routines("combined", CalculixCreepSubroutine)
+    routine = routines("combined", CALCULIX_CREEP)
     forward, _ = routine.creep(73.0, 0.01, 2e4, 4e3)
     back, q = routine.creep(0.0, 0.01, 2e4, 4e3, lend=3, wanted=forward[0])
     assert q == pytest.approx(73.0, rel=1e-9)
@@ -284,9 +284,7 @@ def test_calculix_is_given_the_stress_for_an_increment_where_elasticity_is_aniso
 def test_calculix_routines_keep_states_themselves_through_iterations_and_cutbacks(name, routines, tmp_path, gfortran):
     """Against Abaqus' STATEV: an iteration at another stress and a step that fails must leave nothing behind."""
     law, values = CASES[name]
-    routine = Routine(
-        gfortran, CalculixCreepSubroutine().text(LawWithValues(law, values, name="mine")), tmp_path, "fresh"
-    )
+    routine = Routine(gfortran, CALCULIX_CREEP.text(LawWithValues(law, values, name="mine")), tmp_path, "fresh")
     inner, creep = np.zeros(10), 0.0
     for before, after in pairwise(np.linspace(0.0, 3e4, 11)):
         routine.creep(95.0, creep, before + 4 * (after - before), 4 * (after - before))  # cut back

@@ -34,7 +34,6 @@ def command(
     """What is not said of the rig is a little more than what it did. Ctrl-C ends the work with the best so far."""
     import creepkit as ck
     from creepkit.inverse.selection import Ranking
-    from creepkit.reports.design import design_to_json
 
     histories = ck.read_histories(tests)
     found = [read_results(path, histories) for path in fits]
@@ -50,6 +49,6 @@ def command(
             source, rig=changed_rigs(rigs_of(identified[0].histories, predictor), rig), goal=asked.quantity,
             budget=asked.budget, seed=seed, progress=progress.tick,
         )  # fmt: skip
-    show(result, design_to_json, as_json=as_json, plot=plot if result.tests else None)
+    show(result, as_json=as_json, plot=plot if result.tests else None)
     if plot is not None and not result.tests:
         tell(f"there is no test to draw: {plot} is not written", err=True)

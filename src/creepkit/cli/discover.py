@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,7 +47,6 @@ def command(
     folder.
     """
     import creepkit as ck
-    from creepkit.reports.temperature_law import temperature_law_to_json
 
     with ProgressBar() as progress:
         if all(name.endswith(".json") for name in files):
@@ -72,4 +70,4 @@ def command(
     found.plot(written[1])
     for language, path in zip(("latex", "python"), written[2:], strict=True):
         ck.export(found.valued, language, to=path)
-    show(found, partial(temperature_law_to_json, written=written), as_json=as_json, written=written)
+    show(found, as_json=as_json, written=written)

@@ -81,7 +81,7 @@ def command(
     something else; one is identified as by identify(). JSON and plots of each, LaTeX and Python of the best,
     go to a folder.
     """
-    from creepkit.reports.ranking import print_ranking, ranking_to_json
+    from creepkit.reports.ranking import print_ranking
     from creepkit.screening.screen import CANDIDATE_LAWS
 
     search, chosen = SearchOptions().changed(how), IdentificationSettings().changed(settings)
@@ -131,7 +131,7 @@ def command(
         )
     written = write_ranking(ranking, to)
     if as_json:
-        print_json(ranking_to_json(ranking, written))
+        print_json(ranking, files=written)
     else:
         print_ranking(ranking, written, len(histories))
     if further_tests:
@@ -149,7 +149,6 @@ def _search(
     """Search laws, and write the ranking and the front."""
     from creepkit.law_search.law_file import write_law_file
     from creepkit.reports.law_search import law_search_text
-    from creepkit.reports.ranking import ranking_to_json
 
     _tell_assumptions(histories)
     if to.suffix != ".py":
@@ -163,7 +162,7 @@ def _search(
         found.plot(written[-1])
     if as_json:
         front = [{"law": one.law.name, "complexity": one.complexity, "misfit": one.misfit} for one in found.front]
-        print_json({**ranking_to_json(found.ranking, written), "front": front})
+        print_json(found.ranking, files=written, front=front)
         return
     tell(f"{law_search_text(found)}\n")
     for path in written:
@@ -182,7 +181,6 @@ def _screen(
 ) -> None:
     """Identify every alloy by itself, and write the plate."""
     from creepkit.composition.mapping import map_where_known
-    from creepkit.reports.screening import plate_to_json
 
     with ProgressBar() as progress:
         plate = ck.screen(
@@ -197,7 +195,7 @@ def _screen(
     for mapped in maps.values():
         mapped.plot(to / "compositions.png")
         written.append(to / "compositions.png")
-    show(plate, lambda one: plate_to_json(one, written), as_json=as_json, written=written)
+    show(plate, as_json=as_json, written=written)
     if not as_json:
         for mapped in maps.values():
             tell(f"\n{mapped}")

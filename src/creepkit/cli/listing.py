@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -31,7 +31,7 @@ def command(
     if chosen is None:
         plugins, conflicts = registry.plugins(), registry.conflicts()
         if as_json:
-            print_json({"plugins": [*map(catalogue.plugin_to_json, plugins)], "clashes": conflicts})
+            print_json({"plugins": plugins, "clashes": conflicts})
         else:
             catalogue.print_plugins(plugins, conflicts)
         return
@@ -43,10 +43,8 @@ def command(
     else:
         found = {name: registry.all(chosen)[registry.one(chosen, name).name]}
     if as_json:
-        to_json: Any = catalogue.IN_FULL.get(chosen, (None, catalogue.registered_to_json))[1]
-        documents = [*map(to_json, found.values())]
-        print_json(documents if name is None else documents[0])
+        print_json([*found.values()] if name is None else found[name])
     elif name is None:
         catalogue.print_registered(chosen, found, registry.conflicts(chosen))
     else:
-        catalogue.IN_FULL[chosen][0](found[name])
+        catalogue.IN_FULL[chosen](found[name])

@@ -47,7 +47,6 @@ def command(
     Each has its curve, a band, times to a strain or deflection and to rupture; measured ones are compared with theirs.
     """
     import creepkit as ck
-    from creepkit.reports.forecast import forecast_to_json
 
     source = read_results(fit)
     histories = ck.read_histories(tests) if tests else []
@@ -64,7 +63,7 @@ def command(
         forecast = ck.forecast(
             source, histories, targets=target, tolerances=tolerance or {}, progress=progress.tick, **how
         )  # fmt: skip
-    show(forecast, forecast_to_json, as_json=as_json, plot=plot)
+    show(forecast, as_json=as_json, plot=plot)
 
 
 def _temperature_of(source: Identification | Ranking) -> float:

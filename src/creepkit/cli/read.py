@@ -71,8 +71,8 @@ def command(
     remarked = tuple(remark_flags([history for history in found if not history.outputs]))
     quality = replace(quality, flags=(*quality.flags, *remarked), tests=len(found if remarked else framed))
     if as_json:
-        document = {**report.histories_to_json(found), "quality": report.data_quality_to_json(quality)}
-        print_json({**document, "not read": [str(error) for error in unread]} if unread else document)
+        errors = {"not read": [str(error) for error in unread]} if unread else {}
+        print_json({"tests": found, "quality": quality, **errors})
     else:
         without = len(found) - len(framed)
         counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
@@ -173,14 +173,12 @@ def _records(files: list[Path], reader: str | None) -> list[InstrumentRecord]:
 
 def _show_records(records: list[InstrumentRecord], to: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print records, and draw the one there is."""
-    from creepkit.reports.instrument_records import record_to_json
-
     if to is not None:
         raise HistoryError(f"--to writes tests, and {records[0].origin} is an instrument's record; leave --to away")
     if plot is not None and len(records) > 1:
         raise HistoryError(f"--plot draws one record, found {len(records)}; name one file")
     if as_json:
-        print_json({"records": [record_to_json(record) for record in records]})
+        print_json({"records": records})
     else:
         tell("\n".join(str(record) for record in records))
     if plot is not None:

@@ -54,7 +54,7 @@ def command(
     with ProgressBar() as progress:
         result = loaded.run(to=target, only=only or None, again=again, progress=progress.tick)
     if as_json:
-        print_json(result_to_json(result))
+        print_json(result)
     else:
         print_result(result)
     if result.failures:
@@ -103,17 +103,3 @@ def _test_as_options(fit: Identification) -> str:
     point, end = fit.tested_point, fit.ranges["time"][1] / SECONDS_PER_HOUR
     temperature = f" --temperature-c {point.temperature - ZERO_CELSIUS:.0f}"
     return f"--stress {point.stress:.3g}{temperature} --end-h {float(f'{end:.3g}'):g}"
-
-
-def result_to_json(result: StudyResult) -> dict[str, object]:
-    """Stages, exclusions and the verdict of each group."""
-    return {
-        "title": result.title,
-        "stages": [
-            {"name": one.name, "kind": one.kind, "state": one.state, "key": one.key, "sentence": one.sentence}
-            for one in result.stages
-        ],
-        "exclusions": [{"test": e.test, "frames": e.frames, "reason": e.reason} for e in result.exclusions],
-        "verdicts": {group: ranking.verdict for group, ranking in result.rankings.items()},
-        "report": None if result.report is None else str(result.report),
-    }

@@ -40,7 +40,6 @@ def command(
     test is flagged.
     """
     import creepkit as ck
-    from creepkit.reports.rupture import rupture_to_json
 
     with restated(ValueError, FitError, f"--tensile {' '.join(tensile or ())}: write C=MPA, such as 850=420"):
         strengths = {parsed_number(celsius) + ZERO_CELSIUS: value for celsius, value in (tensile or {}).items()}
@@ -51,4 +50,4 @@ def command(
         **question,
     )
     written = [] if to is None else [assessment.save(to)]
-    show(assessment, rupture_to_json, as_json=as_json, plot=plot, written=written)
+    show(assessment, as_json=as_json, plot=plot, written=written)

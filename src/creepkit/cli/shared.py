@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -87,21 +87,20 @@ def merged_values(source: Any, given: Mapping[str, float] | None) -> dict[str, f
     return {**own, **given} if given else None
 
 
-def show(
-    result: Any, to_json: Callable[[Any], Any], *, as_json: bool, plot: Path | None = None, written: Sequence[Path] = ()
-) -> None:
-    """Draw a result where a picture is asked for, and print it, as text or as what `to_json` makes of it.
+def show(result: Any, *, as_json: bool, plot: Path | None = None, written: Sequence[Path] = ()) -> None:
+    """Draw a result where a picture is asked for, and print it, as text or as JSON.
 
     written : further files that were.
     """
     from creepkit.reports.terminal import print_json, tell, tell_written
 
+    files = [*written, *([] if plot is None else [plot])]
     if plot is not None:
         result.plot(plot)
-    for path in (*written, *([] if plot is None else [plot])):
+    for path in files:
         tell_written(path, err=True)
     if as_json:
-        print_json(to_json(result))
+        print_json(result, files=files)
     else:
         tell(result)
 

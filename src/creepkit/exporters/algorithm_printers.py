@@ -15,7 +15,7 @@ import tokenize
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
-from creepkit.exporters.creep_subroutine import fortran_number, fortran_statements
+from creepkit.exporters.fortran import fortran_number, fortran_statements
 from creepkit.exporters.law_description import comment_lines
 
 ConstantValue = int | float | tuple[float, ...]
@@ -172,6 +172,16 @@ class AlgorithmPrinter:
         return [self.forms["call"].format(self.text(node.value))] if is_call else []
 
     # ---- functions -------------------------------------------------------------------------------------------------
+
+    def program(self, entry: str) -> tuple[list[str], set[str]]:
+        """The functions that one needs, itself last, and the constants that they use."""
+        printed, constants, needed = dict[str, list[str]](), set[str](), {entry}
+        for name in reversed(self.functions):
+            if name in needed:
+                printed[name] = self.definition(name)
+                constants |= {*self.used}
+                needed |= {*re.findall(rf"\b{self.prefix}_(\w+)\(", "\n".join(printed[name]))}
+        return [line for lines in reversed(printed.values()) for line in lines], constants
 
     def definition(self, name: str) -> list[str]:
         """A function of the algorithm, with its comment."""

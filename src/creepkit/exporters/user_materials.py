@@ -7,7 +7,7 @@ calls is a template that puts its arguments in the update's order. A target is a
 from __future__ import annotations
 
 import keyword
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from string import Template
@@ -15,7 +15,7 @@ from string import Template
 import sympy
 
 from creepkit.errors import ExportError
-from creepkit.exporters.algorithm_printers import AlgorithmPrinter, CAlgorithm, ConstantValue, FortranAlgorithm
+from creepkit.exporters.algorithm_printers import CAlgorithm, ConstantValue, FortranAlgorithm
 from creepkit.exporters.c import (
     C_RESERVED,
     STABLE_FUNCTION_NAMES,
@@ -26,7 +26,7 @@ from creepkit.exporters.c import (
     stable_functions_in,
 )
 from creepkit.exporters.creep_forms import elastic_expressions
-from creepkit.exporters.creep_subroutine import (
+from creepkit.exporters.fortran import (
     FORTRAN_RESERVED,
     double_declarations,
     fortran_expression,
@@ -43,8 +43,11 @@ from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, assignment_lines
 from creepkit.language.symbols import principal_stress, time
 from creepkit.records import Exporter, LawWithValues
 
-_MAX_NAME_LENGTH, _LONGEST_ENDING = 31, len("_largest_principal")
-"""Characters of a name of Fortran, and of what the algorithm adds to a routine's stem."""
+MAX_FORTRAN_NAME = 31
+"""Characters of a name by any standard since Fortran 90; a longer one might not fit into a line either."""
+
+_LONGEST_ENDING = len("_largest_principal")
+"""Characters of what the algorithm adds to a routine's stem."""
 
 NO_LIMIT = 1e308
 
@@ -80,14 +83,14 @@ class UserMaterial:
             refuse_conditions(source.law, self.name)
         in_c = self.suffix == ".c"
         reserved = C_RESERVED | STABLE_FUNCTION_NAMES | {"x", "out"} if in_c else FORTRAN_RESERVED
-        longest = 63 if in_c else _MAX_NAME_LENGTH - _LONGEST_ENDING
+        longest = 63 if in_c else MAX_FORTRAN_NAME - _LONGEST_ENDING
         stem = Identifiers(reserved, ignore_case=not in_c, max_length=longest).unique(source.name or source.law.name)
         stem = stem if in_c else stem.lower()
-        longest = 63 if in_c else _MAX_NAME_LENGTH
+        longest = 63 if in_c else MAX_FORTRAN_NAME
         code = LawCode(source, Identifiers(reserved | {f"{stem}_law"}, ignore_case=not in_c, max_length=longest))
         lines = [*heading(code.source, mentions_floors=True), *code.renaming_notes(), "", *self._usage(code)]
         write = c_update if in_c else fortran_update
-        return write(code, stem, lines, self._wrapper(code, stem))
+        return write(code, stem, lines, self._wrapper(code, stem), update_constants(code))
 
     def _usage(self, code: LawCode) -> Iterator[str]:
         yield from (sentence.format(states=len(code.states) + 1 + self.kept) for sentence in self.way)
@@ -97,21 +100,18 @@ class UserMaterial:
         if not self.template:
             return ""
         ny, kept = 1 + len(code.states), 1 + len(code.states) + min(self.kept, 1)
-        outside = [("outside(1, 1)", "temp + to_kelvin"), ("outside(2, 1)", "temp + dtemp + to_kelvin")]
+        last = f"statev({kept})"
+        ends = ("temp", "temp + dtemp", "predef({k})", "predef({k}) + dpred({k})")
+        outside = outside_statements(code, *(("temp", "temp", *ends[2:]) if self.kept else ends))
         if self.kept:  # the code tells the temperature at the end alone
-            last = f"statev({kept})"
-            outside[1] = ("outside(2, 1)", "temp + to_kelvin")
-            outside.append((f"if ({last} .gt. 0.0d0) outside(1, 1)", last))
-        for k in range(1, 1 + len(code.conditions)):
-            outside.append((f"outside(1, {1 + k})", f"predef({k})"))
-            outside.append((f"outside(2, {1 + k})", f"predef({k}) + dpred({k})"))
-        return Template(_template(self.template)).substitute(
+            outside += f"      if ({last} .gt. 0.0d0) outside(1, 1) = {last}\n"
+        return Template(read_template(self.template)).substitute(
             id=stem,
             ny=ny,
             no=1 + len(code.conditions),
             kept=kept,
             time=code.source.units.time,
-            outside="".join(f"      {name} = {value}\n" for name, value in outside),
+            outside=outside,
             keep=f"      statev({kept}) = outside(2, 1)\n" if self.kept else "",
         )
 
@@ -124,7 +124,16 @@ def require_elasticity(source: LawWithValues, target: str) -> None:
         )
 
 
-def _template(name: str) -> str:
+def outside_statements(code: LawCode, first: str, last: str, first_field: str, last_field: str) -> str:
+    """Temperature and conditions where an increment begins and where it ends, as statements for a template."""
+    lines = [f"outside(1, 1) = {first} + to_kelvin", f"outside(2, 1) = {last} + to_kelvin"]
+    for k in range(1, 1 + len(code.conditions)):
+        lines += [f"outside({row}, {1 + k}) = {text.format(k=k)}" for row, text in ((1, first_field), (2, last_field))]
+    return "".join(f"      {line}\n" for line in lines)
+
+
+def read_template(name: str) -> str:
+    """A file of templates/."""
     return resources.files("creepkit.exporters").joinpath("templates", name).read_text(encoding="utf-8")
 
 
@@ -163,17 +172,9 @@ def update_constants(code: LawCode) -> dict[str, ConstantValue]:
         "SIDE": (1.0, *(1.0 if end > state.initial else -1.0 for end, state in zip(limits, states, strict=True))),
         "MPA": float(units.megapascals),
         "SECONDS": float(units.seconds),
+        **{"HELD": False, "ND": 6, "NT": 6, "MOST": 600.0, "VIRGIN": True},
+        **{"TOLERANCE": 1e-3, "TICKS": 65536, "FIRST": 1},
     }
-
-
-def _update_functions(code: LawCode, printer: AlgorithmPrinter) -> tuple[list[str], set[str]]:
-    """The functions of the update, and the constants that they use."""
-    lines, used = list[str](), set[str]()
-    for name in printer.functions:
-        if name != "largest_principal" or code.law.uses(principal_stress):
-            lines += printer.definition(name)
-            used |= {*printer.used}
-    return lines, used
 
 
 def _moduli(code: LawCode) -> dict[str, sympy.Expr]:
@@ -187,10 +188,12 @@ def _moduli(code: LawCode) -> dict[str, sympy.Expr]:
 # ---- C -------------------------------------------------------------------------------------------------------------
 
 
-def c_update(code: LawCode, stem: str, head: Iterable[str], wrapper: str) -> str:
+def c_update(
+    code: LawCode, stem: str, head: Iterable[str], wrapper: str, constants: Mapping[str, ConstantValue]
+) -> str:
     """The file in C99."""
-    printer = CAlgorithm(_template("stress_update.txt"), update_constants(code), stem)
-    functions, used = _update_functions(code, printer)
+    printer = CAlgorithm(read_template("stress_update.txt"), constants, stem)
+    functions, used = printer.program("update")
     law = [*_c_law(code, stem), *_c_moduli(code, stem)]
     parts = [
         *c_block_comment(comment_lines(map(comment_safe, head), " *", 110)),
@@ -233,38 +236,42 @@ def _c_moduli(code: LawCode, stem: str) -> Iterator[str]:
 # ---- Fortran -------------------------------------------------------------------------------------------------------
 
 
-def fortran_update(code: LawCode, stem: str, head: Iterable[str], wrapper: str) -> str:
-    """The file in fixed-form Fortran."""
-    printer = FortranAlgorithm(_template("stress_update.txt"), update_constants(code), stem)
+def fortran_update(
+    code: LawCode,
+    stem: str,
+    head: Iterable[str],
+    wrapper: str,
+    constants: Mapping[str, ConstantValue],
+    entry: str = "update",
+) -> str:
+    """The file in fixed-form Fortran. entry : the function of the algorithm that the wrapper calls."""
+    functions, _ = FortranAlgorithm(read_template("stress_update.txt"), constants, stem).program(entry)
     parts = [
         *comment_lines(map(comment_safe, head), "!", 71),
         "!",
-        *wrapped_lines(wrapper),
-        *_update_functions(code, printer)[0],
+        *wrapped_lines(wrapper.rstrip()),
+        *filter(None, functions),
         "!",
         "! The law: ln of the rate and each internal variable's rate, 1/s,",
         "! then their derivatives to x, row by row.",
         *law_subroutine(code, f"{stem}_law"),
-        "!",
-        "! Shear and bulk modulus, MPa, at a temperature, K.",
-        *_fortran_moduli(code, stem),
+        *(_fortran_moduli(code, stem) if entry == "update" else ()),
     ]
     return "\n".join(parts) + "\n"
 
 
-def _fortran_moduli(code: LawCode, stem: str) -> Sequence[str]:
+def _fortran_moduli(code: LawCode, stem: str) -> list[str]:
     body = [f"modulus({k}) = {fortran_expression(e)}" for k, e in enumerate(_moduli(code).values(), 1)]
     functions = stable_function_definitions(called_names(body))
-    return fortran_statements(
-        [
-            f"subroutine {stem}_moduli({TEMPERATURE}, modulus)",
-            "  implicit none",
-            *(f"  {line}" for line in double_declarations([TEMPERATURE, "modulus(2)"])),
-            *(f"  {line}" for line in body),
-            *(["contains", *(f"  {line}" for line in functions)] if functions else []),
-            f"end subroutine {stem}_moduli",
-        ]
-    )
+    lines = [
+        f"subroutine {stem}_moduli({TEMPERATURE}, modulus)",
+        "  implicit none",
+        *(f"  {line}" for line in double_declarations([TEMPERATURE, "modulus(2)"])),
+        *(f"  {line}" for line in body),
+        *(["contains", *(f"  {line}" for line in functions)] if functions else []),
+        f"end subroutine {stem}_moduli",
+    ]
+    return ["!", "! Shear and bulk modulus, MPa, at a temperature, K.", *fortran_statements(lines)]
 
 
 # ---- NumPy ---------------------------------------------------------------------------------------------------------
@@ -284,7 +291,7 @@ class NumpyUpdate:
         dialect = array_dialect()
         code = LawCode(source, Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_NUMPY_NAMES)))
         function = code.function("update")
-        printer = CAlgorithm(_template("stress_update.txt"), update_constants(code), "")
+        printer = CAlgorithm(read_template("stress_update.txt"), update_constants(code), "")
         inputs = {s: k for k, s in enumerate((*code.point, *code.states, *code.conditions))}
         ny, nx = 1 + len(code.states), 6 + len(code.states)
         used = {*function.symbols, *code.logarithms_used(function).values()}
@@ -308,7 +315,7 @@ class NumpyUpdate:
             f"    return {', '.join(expression_source(e) for e in _moduli(code).values())}",
         ]
         units = code.source.units
-        body = Template(_template("numpy_update.txt")).substitute(
+        body = Template(read_template("numpy_update.txt")).substitute(
             ny=ny, nv=6 + ny, nx=nx, no=1 + len(code.conditions), time=units.time, stress=units.stress
         )
         lines = [*heading(code.source, mentions_floors=True), *code.renaming_notes(), "", *_update_notes(code)]
@@ -316,11 +323,14 @@ class NumpyUpdate:
         numbers = [
             f"{name} = {f'np.array({[*value]})[:, None]' if isinstance(value, tuple) else repr(value)}"
             for name, value in printer.numbers.items()
-            if name not in ("NS", "NC", "NY", "NV", "NX")
+            if name in _NUMPY_NUMBERS
         ]
         blocks = ["\n".join(part) for part in (numbers, law, moduli)]
         return "\n".join([*opening, with_helpers("\n\n\n".join([*blocks, body.strip()]), dialect)]) + "\n"
 
+
+_NUMPY_NUMBERS = ("PRINCIPAL", "BETA", "INITIAL", "LIMIT", "SIDE", "MPA", "SECONDS", "TOLERANCE", "TICKS", "GAMMA")
+"""The numbers in capitals that it uses."""
 
 _NUMPY_NAMES = ("np", "x", "out", "value", "errstate", TEMPERATURE)
 """What the module calls its own variables in the function that holds the law."""

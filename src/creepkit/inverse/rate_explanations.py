@@ -269,13 +269,14 @@ class RateExplanations:
     def _temperature_errors(self) -> tuple[list[Floats], list[float]]:
         """What the usual error of temperature does to ln rates, the same in all tests of one temperature.
 
-        Returns columns (tests,) and standard deviations, one for each temperature.
+        Returns columns (tests,) and standard deviations, one for each temperature that changes the rate.
         """
         temperatures, stress = self.temperatures.round(), self.problem.coordinates.reference.stress
         u, levels = self.x[: self.problem.parameter_count], np.unique(temperatures)
         slopes = log_rate_per_kelvin(self.problem, u, stress, levels)
-        columns = [np.asarray(temperatures == T, float) for T in levels]
-        return columns, list(USUAL_ERRORS["temperature"] * np.abs(slopes))
+        felt = slopes != 0.0  # nowhere where the activation energy is at its bound of zero
+        columns = [np.asarray(temperatures == T, float) for T in levels[felt]]
+        return columns, list(USUAL_ERRORS["temperature"] * np.abs(slopes[felt]))
 
     # ---- single tests ------------------------------------------------------------------------------------------------
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from creepkit.registry import kinds
 from creepkit.reports.blocks import Block, Paragraph, Table, as_text
-from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.terminal import print_table, tell
 
 if TYPE_CHECKING:
@@ -39,36 +37,9 @@ def print_registered(
         tell(f"left out: {sentence}", err=True)
 
 
-def registered_to_json(entry: Registered[Any]) -> dict[str, Any]:
-    """What is known of an exporter, a reader or a camera format."""
-    value = entry.value
-    return {
-        "name": getattr(value, "name", None) or value.__name__,
-        "title": getattr(value, "title", ""),
-        "provenance": str(entry.provenance),
-    }
-
-
 def print_law(entry: Registered[CreepLaw]) -> None:
     """Print one law in full: its equation, parameters, who registered it, and LaTeX."""
     tell(f"{entry.value}\n  from {entry.provenance}\n  LaTeX: {entry.value.latex()}")
-
-
-def law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
-    """All that a law says, as JSON types; the text of a term is for reading, never to be parsed."""
-    law = entry.value
-    return {
-        **fields_to_json(law, "name title fingerprint references"),
-        "provenance": str(entry.provenance),
-        "terms": {label: str(term) for label, term in law.terms.items()},
-        "parameters": {n: fields_to_json(p, "meaning unit bounds scale off limits") for n, p in law.table.items()},
-        "states": {
-            symbol.name: {**fields_to_json(s, "meaning unit initial limit"), "rate": str(s.rate)}
-            for symbol, s in law.states.items()
-        },
-        "constraints": [str(relation) for relation in law.constraints],
-        "latex": law.latex(),
-    }
 
 
 def print_specimen(entry: Registered[Specimen]) -> None:
@@ -99,21 +70,6 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
-    """All that a specimen says of itself."""
-    from creepkit.records import dimensions_of, loads_of, outputs_of
-
-    specimen = entry.value
-    return {
-        **fields_to_json(specimen, "name title outputs"),
-        "units": {o: o.unit for o in outputs_of(specimen)},
-        "loads": {load.name: load.unit for load in loads_of(specimen)},
-        "lengths_mm": {d.name: d.default for d in dimensions_of(specimen)},
-        "nuisances": list(specimen.nuisances),
-        "provenance": str(entry.provenance),
-    }
-
-
 def print_material(entry: Registered[Material]) -> None:
     """Print the law of a material with its values, its range and its source, as an export states them."""
     from creepkit.exporters.law_description import heading
@@ -121,24 +77,12 @@ def print_material(entry: Registered[Material]) -> None:
     tell("\n".join([entry.value.name, *heading(entry.value.valued), f"From {entry.provenance}."]))
 
 
-def material_to_json(entry: Registered[Material]) -> dict[str, Any]:
-    """All that is known of a material; its law as that of a list of laws."""
-    return {
-        **fields_to_json(entry.value, "name title form source"),
-        "law": law_to_json(replace(entry, value=entry.value.law)),  # type: ignore[arg-type]
-        "values": dict(entry.value.values),
-        "ranges": {name: list(ends) for name, ends in entry.value.ranges.items()},
-        "covariance": [list(row) for row in entry.value.covariance],
-        "provenance": str(entry.provenance),
-    }
-
-
-IN_FULL: Mapping[kinds.PluginKind[Any], tuple[Callable[[Any], None], Callable[[Any], dict[str, Any]]]] = {
-    kinds.LAWS: (print_law, law_to_json),
-    kinds.SPECIMENS: (print_specimen, specimen_to_json),
-    kinds.MATERIALS: (print_material, material_to_json),
+IN_FULL: Mapping[kinds.PluginKind[Any], Callable[[Any], None]] = {
+    kinds.LAWS: print_law,
+    kinds.SPECIMENS: print_specimen,
+    kinds.MATERIALS: print_material,
 }
-"""{kind: how one of it is printed in full, and as JSON}."""
+"""{kind: how one of it is printed in full}."""
 
 
 def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str]) -> None:
@@ -151,14 +95,3 @@ def print_plugins(plugins: Sequence[Plugin], conflicts: Sequence[str]) -> None:
     print_table(f"{len(rows)} plugins", ("plugin", "from", "offers", "status"), rows)
     for sentence in (*(plugin.problem for plugin in plugins if plugin.problem), *conflicts):
         tell(sentence)
-
-
-def plugin_to_json(plugin: Plugin) -> dict[str, Any]:
-    """A plugin, what it offers and what is wrong with it."""
-    return {
-        "name": plugin.provenance.name,
-        "from": plugin.provenance.origin,
-        "status": "broken" if plugin.problem else "ok",
-        **fields_to_json(plugin, "problem"),
-        "offers": {word: list(things) for word, things in plugin.contributions.items()},
-    }

@@ -13,7 +13,6 @@ from creepkit.records import SECONDS_PER_HOUR, load_unit
 from creepkit.reports.answer import MOST_CAUTIONS
 from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, plural
 from creepkit.reports.figures import panel_grid, wrapped
-from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.words import DESIGN
 
 if TYPE_CHECKING:
@@ -87,15 +86,8 @@ def design_answer(design: Design, picture: Block | None = None) -> Answer:
     alike = {run.description: [one for one in runs if one.description == run.description] for run in runs}
     shown = [(plural(len(same), "run"), same[0]) for same in alike.values() if len(runs) > 1]
     shown += [("next best", test) for test in design.tests if test.description not in alike][:MOST_NEXT]
-    figures = [
-        (
-            f"{name}, {run.description}",
-            "",
-            _precision(design, run.expectation),
-            f"{_hours(run.hours)} h of machine time",
-        )
-        for name, run in shown
-    ]
+    told = [(_precision(design, run.expectation), f"{_hours(run.hours)} h of machine time") for _, run in shown]
+    figures = [(f"{name}, {run.description}", "", *said) for (name, run), said in zip(shown, told, strict=True)]
     obstacle = design.obstacle or "one law" * _is_hopeless(design)
     limit = next((reason for reason, _ in _refusals(design).most_common(1)), "none")
     return Answer(
@@ -172,55 +164,6 @@ ORDER_BY_LAW = (
     f"probability in steps of {ALIKE:g}, within a step by information"
 )
 """By what planned tests are ordered."""
-
-
-def design_to_json(design: Design) -> dict[str, object]:
-    """Laws, advice, plan and every test considered, as JSON-able data."""
-
-    def row(test: PlannedTest) -> dict[str, Any]:
-        return {
-            "description": test.description,
-            "oven_hours": test.hours,
-            "information_per_hour": test.information_per_hour,
-            "at_draws": test.at_draws,
-            "tests": [
-                {
-                    **fields_to_json(h, "specimen geometry"),
-                    "loading": {"quantity": h.loading.quantity, **fields_to_json(h.loading.program(), "times values")},
-                    "temperature": h.mean_temperature,
-                    "duration": float(h.times[-1]),
-                }
-                for h in test.histories
-            ],
-            **_expectation_to_json(test.expectation),
-        }
-
-    return {
-        "goal": design.goal,
-        "laws": dict(zip(design.laws, design.weights, strict=True)),
-        "to_exclude": list(design.altered),
-        "advice": design.sentence,
-        "budget": design.budget,
-        "plan": [row(test) for test in design.plan],
-        "plan_oven_hours": sum(test.hours for test in design.plan),
-        "expected": None if design.expected is None else _expectation_to_json(design.expected),
-        "tests": [row(test) for test in design.tests],
-        "left_out": dict(design.left_out),
-        "notes": list(design.notes),
-    }
-
-
-def _expectation_to_json(e: Expectation) -> dict[str, Any]:
-    numbers = fields_to_json(e, "information sd current_sd probability wrong")
-    known: dict[str, Any] = {name: value for name, value in numbers.items() if value is not None}
-    if e.parameter_sd:
-        known |= fields_to_json(e, "parameter_sd current_parameter_sd")
-    if e.chi_squares:
-        known["chi_squares"] = [
-            {"true": c.reference_law, "alternative": c.alternative_law, **fields_to_json(c, "current expected")}
-            for c in e.chi_squares
-        ]
-    return known
 
 
 # ---- map -------------------------------------------------------------------------------------------------------------

@@ -15,14 +15,14 @@ from creepkit.errors import FitError
 from creepkit.forecasts.banded_output import CHOICE_OF_LAW, LAW
 from creepkit.forecasts.draws import MISFIT_THERE
 from creepkit.inverse.reference_conditions import usable_frames
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
 from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
-from creepkit.reports.json_values import fields_to_json, finite
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
+from creepkit.reports.wording import say
 from creepkit.reports.words import FORECAST
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
 
 def _misfit_text(misfit: LawMisfit) -> str:
     factor, here = f"{math.exp(abs(misfit.log_factor)):.3g}", f"{misfit.factor:.3g}"
-    return FORECAST["misses"].format(factor=factor, allowed=FORECAST["allowed"].format(here=here) * (here != "1"))
+    return say(FORECAST["misses"], factor=factor, here=here * (here != "1"))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -177,35 +177,6 @@ def end_shares(one: OutputForecast | None) -> dict[str, float]:
     return {part: share for part, share in sorted(shares.items(), key=lambda pair: -pair[1]) if share >= SHOWN_SHARE}
 
 
-def forecast_to_json(forecast: Forecast) -> dict[str, Any]:
-    """The forecast as JSON-able data: s and the units of the outputs; null for what is infinite or not known."""
-    return {
-        **fields_to_json(forecast, "laws level rejected"),
-        "tests": [_test_to_json(test) for test in forecast.tests],
-    }
-
-
-def _test_to_json(test: TestForecast) -> dict[str, Any]:
-    return {
-        "name": test.name,
-        "condition": test.history.condition,
-        "outputs": {
-            name: {
-                "time": finite(one.times),
-                "value": finite(one.value),
-                **fields_to_json(one.band, "median low high lowest highest"),
-                "unit": output_unit(one.output),
-                "shares": finite(one.shares),
-            }
-            for name, one in test.outputs.items()
-        },
-        "times": [fields_to_json(one, "event value median low high chance measured censored") for one in test.times],
-        **fields_to_json(test, "includes extrapolation notes caution"),
-        "misfit": test.misfit and fields_to_json(test.misfit, "factor stress temperature log_factor"),
-        "inside": None if test.inside is None else fields_to_json(test.inside, "share whole"),
-    }
-
-
 # ---- figure ----------------------------------------------------------------------------------------------------------
 
 
@@ -222,10 +193,6 @@ TIME_COLOUR, RUPTURE_COLOUR = "#c51b7d", "#b2182b"
 
 BELOW_EDGE = 0.04
 """Of the height of a panel: how far below its upper edge the interval of the rupture time is drawn."""
-
-
-LONGEST_AXIS = 5.0
-"""Of the time of a test: beyond, an interval goes on to the right of the axis, as an arrow says."""
 
 
 SHOWN_RATIO = 1e-3
@@ -289,23 +256,14 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str)
     axes.plot(hours, curve, color="#1f3f73", lw=1.3, label="identified law")
     label = "measured" if measured.size else None
     axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6, label=label)
-    start, end = float(hours[0]) if logarithmic else 0.0, _time_end(test)
+    start, end = float(hours[0]) if logarithmic else 0.0, float(hours[-1])
     span(axes, "x", start, end, logarithmic=logarithmic)
-    axes.set_xlim(0.95 * start, 1.03 * end)
+    axes.set_xlim(start, end)  # where the bands end, not beyond
     _draw_times(axes, test, one, level)
     axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
     axes.set_xlabel("time, h", fontsize=8)
     axes.tick_params(labelsize=7)
-
-
-def _time_end(test: TestForecast) -> float:
-    """h, the end of the time axis: that of the test, or of an interval that begins before it, up to LONGEST_AXIS."""
-    last = end = float(test.history.times[-1]) / SECONDS_PER_HOUR
-    for time in sorted((t for t in test.times if np.isfinite(t.low)), key=lambda t: t.low):
-        if time.low / SECONDS_PER_HOUR < end:
-            end = max(end, min(time.high / SECONDS_PER_HOUR, LONGEST_AXIS * last))
-    return end
 
 
 def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import Block, Items, Paragraph, Table, as_text, listed, plural
 from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
-from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import kind_of_test, load_text, program_text
 
 if TYPE_CHECKING:
@@ -146,27 +145,6 @@ def _end_text(history: History) -> str:
     return "stopped before rupture" if history.unruptured else ""
 
 
-def histories_to_json(histories: Sequence[History]) -> dict[str, Any]:
-    """The tests without their frames, for JSON: times in s, temperatures in K, outputs in creepkit's units."""
-    return {
-        "tests": [
-            {
-                **fields_to_json(history, "name source specimen alloy strain_measure includes_elastic"),
-                **fields_to_json(history, "minimum_rate rupture_time unruptured geometry labels"),
-                "condition": program_text(history),
-                "frames": int(history.times.size),
-                "used_frames": int(np.asarray(history.used).sum()),
-                "times": [float(history.times[0]), float(history.times[-1])],
-                "outputs": {
-                    name: {"unit": output_unit(name, history.specimen), "first": float(y[0]), "last": float(y[-1])}
-                    for name, y in history.outputs.items()
-                },
-            }
-            for history in histories
-        ]
-    }
-
-
 # ---- data quality ----------------------------------------------------------------------------------------------------
 
 
@@ -181,12 +159,6 @@ def quality_blocks(quality: DataQuality, most: int | None = None) -> list[Block]
         return [Paragraph(f"nothing suspect in {plural(quality.tests, 'test')}")]
     head = f"{plural(len(quality.flags), 'flag')} in {plural(quality.tests, 'test')}; nothing was dropped"
     return [Paragraph(head), Items([str(flag) for flag in quality.flags[:most]])]
-
-
-def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
-    """The flags with all their numbers, for JSON: times in s, jumps in the output's unit."""
-    names = "tests kind frames reason time jumps proposal"
-    return {"tests": quality.tests, "flags": [fields_to_json(flag, names) for flag in quality.flags]}
 
 
 # ---- over time -------------------------------------------------------------------------------------------------------

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.instruments.clock_alignment import UNIX_TIME
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.figures import Course, Panels, draw_over_time, over_time
-from creepkit.reports.json_values import fields_to_json
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,27 +37,6 @@ def record_text(record: InstrumentRecord) -> str:
     width = max((len(name) for name in record.channels), default=0)
     lines += [f"  {name:{width}}  {_channel_text(channel)}" for name, channel in record.channels.items()]
     return "\n".join([*lines, *(f"  note: {note}" for note in record.notes)])
-
-
-def record_to_json(record: InstrumentRecord) -> dict[str, Any]:
-    """What record_text says, as data; values in MPa, K, mm, N or as written."""
-    channels = [
-        {
-            **fields_to_json(channel, "name quantity reference written_unit missing"),
-            "least": None if channel.missing == channel.values.size else float(np.nanmin(channel.values)),
-            "largest": None if channel.missing == channel.values.size else float(np.nanmax(channel.values)),
-        }
-        for channel in record.channels.values()
-    ]
-    return {
-        **fields_to_json(record, "name source notes"),
-        "rows": int(record.times.size),
-        "interval_s": record.interval,
-        "duration_s": float(np.ptp(record.times)),
-        "start_unix_s": record.start,
-        "gaps_s": record.gaps.tolist(),
-        "channels": channels,
-    }
 
 
 def _channel_text(channel: Channel) -> str:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT
-from creepkit.records import is_logarithmic
 from creepkit.reports.answer import answer_text, titled_law
 from creepkit.reports.blocks import Block, Cell, Items, Paragraph, Table, as_text, listed, number, plural
 from creepkit.reports.compared_values import judged_readings, misfit_of
@@ -20,7 +18,6 @@ from creepkit.reports.condition_colours import distinct_colours, temperatures_ce
 from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
 from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
-from creepkit.reports.json_values import fields_to_json
 from creepkit.reports.load_programs import program_text
 from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
 from creepkit.reports.remarks import challenge_text
@@ -124,30 +121,6 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     tell(f"{answer_text(ranking.best, ranking, ' '.join(('creepkit report', *map(str, files[:1]))))}\n")
     for path in written:
         tell_written(path)
-
-
-def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
-    """The same as JSON-able data."""
-    challenges = ranking.challenges
-    return {
-        "headline": ranking.best.headline,
-        **{name: getattr(ranking, name) for name in ("verdict", "decisive", "adequacy", "further", "failed")},
-        "challenges": None
-        if challenges is None
-        else [asdict(one) | {"sentence": challenge_text(one)} for one in challenges],
-        "laws": [{**_fit_to_json(one.fit), "excess": one.excess, "weight": one.weight} for one in ranking.laws],
-        "files": [str(path) for path in written],
-    }
-
-
-def _fit_to_json(fit: Identification) -> dict[str, Any]:
-    return {
-        "law": fit.law.name,
-        **{f"rms_ln_{name}": fit.rms for name in fit.errors if is_logarithmic(name)},
-        "parameters": {e.name: fields_to_json(e, "value low high unit verdict") for e in fit.estimates},
-        **{name: getattr(fit, name) for name in ("errors", "adequacy", "numerical_error", "nuisances", "noise_model")},
-        "notes": list(fit.remarks),
-    }
 
 
 # ---- figure ----------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
-"""What limits the trust in an identification, and what its tests may hide, in words: remarks beside its verdict.
+"""What limits the trust in an identification, and what its tests may hide: remarks beside its verdict.
 
 The engine finds kinds and numbers (inverse.nuisance_plausibility, inverse.nuisance_parameters, inverse.
-defect_correction, inverse.selection.challenges); sentences have no full stop.
+defect_correction, inverse.selection.challenges); creepkit.reports.words has the sentences.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, beyond_intervals
 from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
 from creepkit.records import output_unit
+from creepkit.reports.wording import say
+from creepkit.reports.words import CHALLENGES, PERTURBATIONS, REMARKS, SIZES
 
 if TYPE_CHECKING:
     from creepkit.inverse.defect_correction import NumericalError
@@ -40,63 +42,34 @@ def remarks(fit: Identification, *, perturbations: bool = True) -> tuple[str, ..
 
 def _of_numbers(fit: Identification) -> Iterator[str]:
     if fit.provenance.get("search_ends") == 1:
-        yield "the search ended once: whether another minimum is lower was not examined (raise starts)"
-    yield from map(implausible_text, fit.adequacy.implausible if fit.adequacy is not None else ())
+        yield REMARKS["one search"]
+    for one in fit.adequacy.implausible if fit.adequacy is not None else ():
+        yield nuisance_text(one, "implausible")
     for name, bound in cut_intervals(fit.law, fit.estimates).items():
-        yield (
-            f"the interval of {name} ends at its bound, {bound:.4g}, and not by the tests: intervals of rates and of "
-            "the local exponent do not know this bound and may reach beyond it"
-        )
+        yield say(REMARKS["cut"], name=name, bound=bound)
     if fit.numerical_error is not None:
         yield numerical_error_text(fit.numerical_error)
 
 
 def numerical_error_text(found: NumericalError) -> str:
     """What the predictor was wrong by, and what it would have done to the values."""
-    sizes = ", ".join(f"{size:.2g} {output_unit(name)}".strip() + f" in {name}" for name, size in found.size.items())
-    incomplete = f"; {', '.join(found.incomplete)} could not be corrected" if found.incomplete else ""
-    return (
-        f"at the optimum {found.predictor} differs from {found.refined} by {sizes} (rms); at most {found.noises:.2g} "
-        f"noises. This is corrected, and would have moved values by up to {found.shift:.2g} of their standard "
-        f"deviations{incomplete}{'' if found.settled else '; a further correction may move them again'}"
-    )
+    sizes = ", ".join(f"{_amount(size, output_unit(name))} in {name}" for name, size in found.size.items())
+    return say(REMARKS["numerical"], one=found, sizes=sizes, unsettled="" if found.settled else REMARKS["unsettled"])
 
 
 # ---- nuisances -------------------------------------------------------------------------------------------------------
 
 
-def nuisance_text(one: ImplausibleNuisance) -> str:
-    """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"."""
-    where = f"in {one.output} of '{one.owner}'" if one.output else f"in '{one.owner}'"
-    return f"{_article(one.kind)} {one.kind} of {_amount(one.value, one.unit)} {where}{_share(one)}"
-
-
-def implausible_text(one: ImplausibleNuisance) -> str:
-    """How far it lies from what it stands for."""
-    size = {
-        "stated": "the standard deviation that was stated for it",
-        "noise": "the noise of a frame",
-        "usual": f"a usual {one.kind}",
-    }[one.size_source]
-    return (
-        f"the {one.kind}{f' of {one.output}' if one.output else ''} of '{one.owner}' is "
-        f"{_amount(one.value, one.unit)}{_share(one)}, {one.standard_deviations:.2g} times {size} "
-        f"({_amount(one.size, one.unit)}): it stands for more than its name says, look at the test or try another law"
-    )
-
-
-def _share(one: ImplausibleNuisance) -> str:
-    if not np.isfinite(one.share):
-        return ""
-    return f", {100 * one.share:.2g} % {'of its largest value' if one.output else 'from its nominal length'}"
+def nuisance_text(one: ImplausibleNuisance, kind: str = "nuisance") -> str:
+    """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"; kind : of REMARKS."""
+    share = say(REMARKS["of value" if one.output else "of length"], one=one) if np.isfinite(one.share) else ""
+    amounts = {"amount": _amount(one.value, one.unit), "size": _amount(one.size, one.unit)}
+    article, expected = "an" if one.kind[0] in "aeiou" else "a", say(REMARKS[one.size_source], one=one)
+    return say(REMARKS[kind], one=one, share=share, article=article, expected=expected, **amounts)
 
 
 def _amount(value: float, unit: str) -> str:
     return f"{value:.2g} {unit}".strip()
-
-
-def _article(noun: str) -> str:
-    return "an" if noun[0] in "aeiou" else "a"
 
 
 # ---- perturbations ---------------------------------------------------------------------------------------------------
@@ -120,28 +93,22 @@ def test_change_text(one: Perturbation) -> str:
 
 def perturbation_text(one: Perturbation) -> str:
     """By how much the rate amid the tests would move with what, to follow "would move"."""
-    alone, energy = one.tests == 1, ""
-    each = "the test" if alone else f"each of {one.tests} tests"
-    if np.isfinite(one.per_kelvin):
-        whence = "assumed" if one.assumed else "by the law"
-        energy = f" ({100 * float(np.expm1(one.per_kelvin)):.2g} % a kelvin, {whence})"
-    if one.kind == DRIFT:
-        drift = "a linear drift of" if alone else "independent linear drifts of the temperature,"
-        cause = f"{drift} {one.size:.2g} K over {each}"
-    else:
-        kind, what = ("offset", _output(one.kind)) if one.kind.startswith(OFFSET) else ("error", one.kind)
-        cause = f"{f'an {kind}' if alone else f'independent {kind}s'} of {one.amount} in the {what} of {each}"
-    return f"by {change_text(one.rate_change)}{'' if alone else ' (one standard deviation)'} with {cause}{energy}"
+    several, kind = one.tests > 1, "drift" if one.kind == DRIFT else "error"
+    error = "offset" if one.kind.startswith(OFFSET) else "error"
+    cause = say(PERTURBATIONS[kind + "s" * several], one=one, error=error, what=_read(one.kind))
+    known = {"whence": "assumed" if one.assumed else "by the law", "deviation": " (one standard deviation)" * several}
+    energy = np.expm1(one.per_kelvin)
+    return say(PERTURBATIONS["moves"], change=change_text(one.rate_change), cause=cause, energy=energy, **known)
 
 
 def _not_included(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
     """On what intervals do not include, with what it would do to the rate; none where that is little."""
     told = [perturbation_text(p) for p in beyond_intervals(perturbations) if p.rate_change > NOTEWORTHY_CHANGE]
-    return (f"the intervals do not include what would move the rate amid the tests: {'; '.join(told)}",) if told else ()
+    return (PERTURBATIONS["not included"].format(effects="; ".join(told)),) if told else ()
 
 
-def _output(kind: str) -> str:
-    return kind.removeprefix(OFFSET).replace("_", " ")
+def _read(kind: str) -> str:
+    return kind.removeprefix(OFFSET).replace("_", " ") if kind.startswith(OFFSET) else kind
 
 
 # ---- challenges ------------------------------------------------------------------------------------------------------
@@ -149,39 +116,26 @@ def _output(kind: str) -> str:
 
 def challenge_text(one: Challenge) -> str:
     """What the tests allow beside the best law, to follow "but"."""
-    if one.kind == "unmodelled effect" and one.laws:
-        sizes = " or with ".join(map(_size_text, one.sizes))
-        beside = f" (weight {one.weights[1]:.2f})" if one.weights else ""
-        return f"with {sizes} {' or '.join(one.laws)} would explain them{beside}"
     if one.kind == "unmodelled effect":
-        (own, others), (usual,) = one.weights, one.sizes
+        own, weight = one.weights or (np.nan, np.nan)
+        usual, sizes = one.sizes[0], [*map(_size_text, one.sizes)]
         effect = Perturbation(usual.kind, usual.size, usual.unit).description
-        return f"{effect}, which was not modelled, would leave it a weight of {own:.2f} ({one.other}: {others:.2f})"
-    altered = f"a sum with {one.other}" if one.kind == "sum" else one.subject
+        kind = "remedy" if one.laws else "effect"
+        return say(CHALLENGES[kind], one=one, sizes=sizes, effect=effect, own=own, weight=weight)
     if one.excess is None:
-        return f"whether {altered} explains them as well could not be examined"
-    if one.kind == "sum":
-        altered = f"a share of {100 * one.size:.0f} % of the rate by {one.other}"
-    else:
-        altered = f"{altered} of {one.size:.3g} MPa"
-    difference = f"its chi-square is {abs(one.excess):.1f} {'higher' if one.excess > 0 else 'lower'}"
-    if one.fits_better:
-        return f"{altered} fits better ({difference})"
-    if abs(one.excess) < SMALLEST_SHOWN:
-        return f"{altered} explains them as well (its chi-square is the same)"
-    return f"{altered} {'is not excluded' if one.excess > 0 else 'explains them as well'} ({difference})"
+        return say(
+            CHALLENGES["unknown"], altered=say(CHALLENGES["unknown sum"], one=one) if one.kind == "sum" else one.subject
+        )
+    side = "higher" if one.excess > 0 else "lower"
+    kind = "better" if one.fits_better else "same" if abs(one.excess) < SMALLEST_SHOWN else side
+    return say(CHALLENGES[kind], altered=say(CHALLENGES[one.kind], one=one), difference=abs(one.excess), side=side)
 
 
 def _size_text(one: PerturbationSize) -> str:
     """A perturbation with the size at which a law explains the tests."""
-    where = "the test" if one.tests == 1 else f"each of the {one.tests} tests"
-    if one.unit == "%":
-        share = f"{abs(one.size):.2g} %"
-        if one.differs:
-            return f"independent errors of up to {share} in the {one.kind} of {where}"
-        side, where = "smaller" if one.size < 0 else "larger", f" in {where}" if one.tests > 1 else ""
-        return f"a {one.kind} {share} {side}{where}"
-    amount = f"{'up to ' if one.differs else ''}{one.size:{'' if one.differs else '+'}.2g} {one.unit}".strip()
-    if one.kind == DRIFT:
-        return f"{'independent drifts' if one.differs else 'a drift'} of the temperature of {amount} over {where}"
-    return f"{'independent offsets' if one.differs else 'an offset'} of {amount} in the {_output(one.kind)} of {where}"
+    each = f"each of the {one.tests} tests" * (one.tests > 1)
+    kind = "length" if one.unit == "%" else "drift" if one.kind == DRIFT else "offset"
+    amount = f"{abs(one.size) if one.differs else one.size:{'' if one.differs else '+'}.2g} {one.unit}".strip()
+    of = {"what": _read(one.kind), "each": each, "where": each or "the test", "amount": amount}
+    smaller = "smaller" if one.size < 0 else "larger"
+    return say(SIZES[kind + "s" * one.differs], size=abs(one.size), smaller=smaller, **of)

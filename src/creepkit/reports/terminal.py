@@ -46,12 +46,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     tell(as_text([Table(title, columns, [*rows])]).strip("\n"))
 
 
-def print_json(value: Any) -> None:
-    """Print a result, records and arrays among it, as JSON."""
+def print_json(value: Any, **more: Any) -> None:
+    """Print a result, records and arrays among it, as JSON; more : keys beside those of a record."""
     from creepkit.files.json_documents import json_text
-    from creepkit.files.record_codec import record_to_json
+    from creepkit.reports.documents import document
 
-    put(json_text(record_to_json(value)))
+    put(json_text({**document(value), **document(more)} if more else document(value)))
 
 
 class ProgressBar:

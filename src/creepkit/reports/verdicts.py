@@ -1,13 +1,13 @@
 """What the tests say of a law: whether they reject it, what it leaves, what would explain that, and which law is best.
 
-The engine finds kinds and numbers (inverse.adequacy, inverse.explanation, inverse.selection.ranking); sentences have no
-full stop.
+The engine finds kinds and numbers (inverse.adequacy, inverse.explanation, inverse.selection.ranking), and
+creepkit.reports.words has the sentences, without a full stop.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.explanation import VERDICT_ODDS
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, LEAST_NOISE_FREEDOM
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES
-from creepkit.records import is_logarithmic, output_unit
-from creepkit.records.units import celsius_text, time_text
+from creepkit.reports import words
 from creepkit.reports.blocks import first_of
 from creepkit.reports.remarks import challenge_text, nuisance_text
+from creepkit.reports.wording import amount_text, noises_text, say
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
@@ -34,10 +34,6 @@ IMPLAUSIBLE_CHI_SQUARE = 0.05
 NOTEWORTHY_EXPECTATION, NOTEWORTHY_RATIO = 1.05, 1.25
 """Mean reduced chi-square of a right law from which on it is said beside the one that was found; and mean of predicted
 over measured beyond which that is what contradicts, rather than a trend."""
-
-
-SMALLEST_SHOWN_P_VALUE, LARGEST_SHOWN_ODDS = 1e-12, 13.8
-"""p-values below, and ln of odds above, are shown as such."""
 
 
 LARGEST_KELVIN, LARGEST_LOAD = 40.0, 1.3
@@ -57,35 +53,8 @@ ROUND_TOLERANCE = 0.2
 """Of ln: rates scatter."""
 
 
-MOST_NAMED, MOST_IN_A_HEADLINE, MOST_WITHOUT_NOISE = 6, 2, 4
-"""Tests in a sentence, in a headline, and of those whose noise is not known."""
-
-
-# ---- numbers ---------------------------------------------------------------------------------------------------------
-
-
-def p_value_text(p: float) -> str:
-    """A probability as "p = 0.028"."""
-    if p <= SMALLEST_SHOWN_P_VALUE:
-        return f"p < {SMALLEST_SHOWN_P_VALUE:g}"
-    return f"p = {p:.{2 if p >= 1e-3 else 1}g}"
-
-
-def noises_text(noises: float) -> str:
-    """Multiples of a noise to two digits, without a power of ten."""
-    return f"{float(f'{noises:.2g}'):g}" if np.isfinite(noises) and noises < 1e5 else f"{noises:.2g}"
-
-
-def odds_text(log_odds: float) -> str:
-    """Odds as a factor: "30 times"; log_odds : their ln."""
-    more = " or more" if log_odds > LARGEST_SHOWN_ODDS else ""
-    return f"{float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f} times{more}"
-
-
-def _amount(value: float, output: str) -> str:
-    """So much of an output, strains in per cent."""
-    percent = is_logarithmic(output)
-    return f"{(100.0 if percent else 1.0) * value:.2g} {'%' if percent else output_unit(output)}".strip()
+MOST_WITHOUT_NOISE = 4
+"""Tests that are named of those whose noise is not known."""
 
 
 # ---- one cause -------------------------------------------------------------------------------------------------------
@@ -93,63 +62,55 @@ def _amount(value: float, output: str) -> str:
 
 def cause_headline(one: Explanation) -> str:
     """What the rates of tests show, in a few words."""
-    if one.kind == "one test":
-        return f"{_tests(one)} {'do' if len(one.tests) > 1 else 'does'} not agree with the others"
-    if one.kind == "two groups":
-        few = first_of(one.tests, MOST_IN_A_HEADLINE)
-        return _stated_groups(one) or f"tests are of two groups: {few} creep {np.exp(one.size):.2g} times as fast"
-    low, high = one.ends
-    if one.is_of_curves:
-        return f"the {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests"
-    said = f"the {one.kind} {'rises' if high > low else 'falls'} from"
-    if one.kind == "stress exponent":
-        return f"{said} {low:.2g} at {one.at[0]:.4g} MPa to {high:.2g} at {one.at[1]:.4g} MPa"
-    first, last = (celsius_text(T, T) for T in one.at)
-    return f"{said} {low / 1e3:.3g} kJ/mol at {first} to {high / 1e3:.3g} kJ/mol at {last}"
+    return say(words.CAUSES[_cause_kind(one)], **_of_cause(one))
 
 
 def cause_sentence(one: Explanation) -> str:
     """What it is: of tests by how much, and which errors would make it."""
-    if one.is_of_law:
-        return cause_headline(one) + ", more than this law lets it" * (not one.is_of_curves)
-    speed = f"{np.exp(one.size):.3g} times as fast"
-    if one.kind == "two groups":
-        named = first_of(one.tests, MOST_NAMED)
-        if one.label:
-            return f"{_stated_groups(one)} at equal conditions ({one.label}: {named})"
-        return f"tests ({named}) creep {speed} as the others at equal conditions: are they of one material?"
     texts = [f"{name} = {v:.4g} [{low:.4g}, {high:.4g}]" for name, (v, low, high) in one.without.items()]
-    without = f"; without it {', '.join(texts)}" if texts else ""
-    if len(one.tests) > 1:
-        factors = " and ".join(f"{factor:.3g}" for factor in one.factors)
-        return f"{_tests(one)} creep {factors} times as fast as the others say{without}"
-    errors = _errors(one)
-    cause = f"; it would agree with them {errors}" if errors else ""
-    near = f" (or '{one.near[0]}' is to blame)" if one.near else ""
-    return f"{_tests(one)} ({one.condition}) creeps {speed} as the others say{near}{cause}{without}"
+    known = {"cause": cause_headline(one), "without": ", ".join(texts), "errors": _errors(one)}
+    kind = _cause_kind(one)
+    return say(
+        words.CAUSES_AT_LENGTH.get("changes" if kind == one.kind != "one test" else kind, "{cause}"),
+        **known,
+        **_of_cause(one),
+    )
 
 
 def cause_caution(one: Explanation) -> str:
     """Of tests their size, as a rate and as what would make it, else that it is no verdict."""
-    if one.kind != "one test":
-        return f"{cause_headline(one)}: {np.exp(one.odds):.2g} times likelier than scatter, too little for a verdict"
-    factors = " and ".join(f"{factor:.2g}" for factor in one.factors or (float(np.exp(one.size)),))
-    verb = "creep" if len(one.tests) > 1 else "creeps"
-    found = f"{' and '.join(one.tests)} {verb} {factors} times as fast as the others lead to expect"
-    return f"{found}; {_kelvin(one)} would do it" if _may_be_temperature(one) else found
+    sizes = " and ".join(f"{factor:.2g}" for factor in one.factors or (np.exp(one.size),))
+    kelvin = _kelvin(one) if _may_be_temperature(one) else ""
+    text = words.CAUSE_CAUTIONS[_cause_kind(one) if one.kind == "one test" else "others"]
+    return say(text, one=one, cause=cause_headline(one), odds=np.exp(one.odds), sizes=sizes, kelvin=kelvin)
 
 
 def cause_next_step(one: Explanation) -> str:
     """What to do about it where it lies in the tests."""
-    if one.label:
-        key, _, value = one.label.partition(" ")
-        return f'identify each {key} apart (group_by = "{key}" in a study, or --only "{key}={value}")'
+    key, _, value = one.label.partition(" ")
+    kind = _cause_kind(one)
     if one.kind == "one test" and one.odds < VERDICT_ODDS:
-        return f"check the {'temperature' if _may_be_temperature(one) else 'record'} of {one.tests[0]}"
+        kind = "temperature" if _may_be_temperature(one) else "record"
+    return say(words.NEXT[f"check {kind}"], one=one, key=key, value=value)
+
+
+def _cause_kind(one: Explanation) -> str:
+    """Which of words.CAUSES it is."""
+    if one.is_of_law:
+        return "curves" if one.is_of_curves else one.kind
     if one.kind == "two groups":
-        few = first_of(one.tests, MOST_IN_A_HEADLINE)
-        return f"look how {few} differ (material, heat, rig), then identify each group apart"
-    return f"check {_tests(one)} again (label, unit, thermocouple), then identify without"
+        return "stated groups" if one.label else "groups"
+    return "tests" if len(one.tests) > 1 else "one test"
+
+
+def _of_cause(one: Explanation) -> dict[str, Any]:
+    """What sentences on it are made of."""
+    (low, high), (start, end), factor = one.ends, one.at, float(np.exp(one.size))
+    first, other = one.label, one.beside or "the others do"
+    if one.beside and factor < 1.0:
+        factor, first, other = 1.0 / factor, other, first
+    values = {"low": low, "high": high, "start": start, "end": end, "rises": "rises" if high > low else "falls"}
+    return {"one": one, **values, "factor": factor, "first": first, "other": other, "near": [*one.near, ""][0]}
 
 
 def _may_be_temperature(one: Explanation) -> bool:
@@ -159,40 +120,25 @@ def _may_be_temperature(one: Explanation) -> bool:
 
 def _kelvin(one: Explanation) -> str:
     kelvin = one.errors["temperature"]
-    return f"{abs(kelvin):.2g} K {'less' if kelvin < 0 else 'more'} than stated"
-
-
-def _stated_groups(one: Explanation) -> str:
-    """How one group that the tests state creeps beside the other, the faster first; "" of others."""
-    if not one.label:
-        return ""
-    factor, first, other = float(np.exp(one.size)), one.label, one.beside or "the others"
-    if factor < 1.0 and one.beside:
-        factor, first, other = 1.0 / factor, other, first
-    return f"{first} creeps {factor:.2g} times as fast as {other}" + ("" if one.beside else " do")
-
-
-def _tests(one: Explanation) -> str:
-    names = " and ".join(f"'{name}'" for name in one.tests)
-    return f"tests {names}" if len(one.tests) > 1 else f"test {names}"
+    return say(words.ERRORS["kelvin"], kelvin=abs(kelvin), less="less" if kelvin < 0 else "more")
 
 
 def _errors(one: Explanation) -> str:
     """With which errors of what is stated the test would agree, units first."""
-    load, units, others = one.errors.get("load", np.inf), list[str](), list[str]()
+    load, units, others, likely = one.errors.get("load", np.inf), list[str](), list[str](), list[str]()
     for quantity, known in UNIT_FACTORS.items():
         ratio = one.errors.get(quantity, 0.0)
         factor = max(ratio, 1.0 / ratio) if ratio > 0 else 1.0
-        text = f"if its {quantity} were {factor:.3g} times {'smaller' if ratio < 1 else 'larger'}"
-        near = [f"{unit:g}" for unit in known if abs(np.log(factor / unit)) < ROUND_TOLERANCE]
-        units += [f"{text} (nearly {near[0]}: a unit?)"] if near else []
-        others += [text] if factor > LARGEST_LOAD and not near else []
-    likely = list[str]()
+        unit = next((unit for unit in known if abs(np.log(factor / unit)) < ROUND_TOLERANCE), 0.0)
+        smaller = "smaller" if ratio < 1 else "larger"
+        if unit or factor > LARGEST_LOAD:
+            text = say(words.ERRORS["factor"], quantity=quantity, factor=factor, smaller=smaller, unit=unit)
+            (units if unit else others).append(text)
     if _may_be_temperature(one):
         actual = one.temperature + one.errors["temperature"]
-        likely.append(f"at {celsius_text(actual, actual)}, {_kelvin(one)}")
+        likely.append(say(words.ERRORS["temperature"], actual=actual, kelvin=_kelvin(one)))
     if 1.0 / LARGEST_LOAD <= load <= LARGEST_LOAD:
-        likely.append(f"at a load {abs(100 * (load - 1)):.2g} % {'lower' if load < 1 else 'higher'}")
+        likely.append(say(words.ERRORS["load"], change=abs(load - 1), lower="lower" if load < 1 else "higher"))
     return " or ".join([*units, *likely] or others)
 
 
@@ -201,116 +147,104 @@ def _errors(one: Explanation) -> str:
 
 def adequacy_text(found: Adequacy) -> str:
     """One sentence, to follow "the law": whether the tests reject it, with what is left and where."""
-    if found.unpredicted and found.verdict == "cannot be judged":
-        named = f"test '{found.unpredicted[0]}'{first_of(found.unpredicted[1:], 0)}"
-        return f"cannot be judged: it does not predict every reading of {named}"
+    parts, p, contradicting = _parts(found), _p_value(found), found.contradicting
+    kind, cause = _verdict_kind(found, parts), explanation_text(found)
+    if cause and kind == "leaves" and not found.is_explained:
+        cause = say(words.OF_VERDICTS["rates"], cause=cause)
+    return say(
+        words.VERDICTS[kind],
+        found=found,
+        why=how_to_state_noise(found.not_judged, found.few_frames),
+        sources=[*dict.fromkeys(one.noise_source for one in found.outputs)],
+        qualified=qualification(found),
+        scatter=scatter_text(found.rate_scatter) if found.rate_scatter > 0 else "",
+        doubt=words.OF_VERDICTS["doubt"] * (found.chi_square < IMPLAUSIBLE_CHI_SQUARE),
+        slow=words.OF_VERDICTS["slow"] * bool(np.isfinite(found.correlation)),
+        chi_square=_chi_square(found),
+        p=p,
+        curves=p * bool(found.outputs),
+        contradiction="" if contradicting is None else contradiction_text(contradicting),
+        parts=" and ".join(parts) or words.OF_VERDICTS["noise"],
+        largest="" if found.largest is None else _largest(found.largest),
+        remedies=() if found.explanations else [one.description for one in found.remedies],
+        cause=cause,
+    )
+
+
+def _verdict_kind(found: Adequacy, parts: Sequence[str]) -> str:
+    """Which of words.VERDICTS is said of a law; parts : what it leaves."""
     if found.verdict == "cannot be judged":
-        return f"cannot be judged: {how_to_state_noise(found.not_judged, found.few_frames)}"
+        return "unpredicted" if found.unpredicted else "not judged"
     if found.explains:
-        source = " and ".join(dict.fromkeys(o.noise_source for o in found.outputs))
-        slow = "; what is left is autocorrelated, noise or the law's own" * bool(np.isfinite(found.correlation))
-        scatter = f" (rates of tests scatter by {scatter_text(found.rate_scatter)})" if found.rate_scatter > 0 else ""
-        doubt = " (far larger than what the readings show: check its unit)"
-        scatter += doubt if found.chi_square < IMPLAUSIBLE_CHI_SQUARE else ""
-        said = f"is not rejected by the tests at their {source} noise{qualification(found)}{scatter}"
-        return f"{said}: {_chi_square(found)}, {_p_value(found)}{slow}"
+        return "explains"
     if found.contradicting is not None and not found.outputs:
-        return f"is rejected by the tests: {contradiction_text(found.contradicting)}"
-    parts = [
-        f"{_amount(o.discrepancy, o.output)} of {o.output} ({noises_text(o.discrepancy_in_noises)} times its "
-        f"{o.noise_source} noise)"
-        for o in sorted(found.outputs, key=lambda o: -o.discrepancy_in_noises)
-        if o.discrepancy > 0
-    ]
+        return "values"
+    return "rates" if found.explanations and not parts else "leaves"
+
+
+def _parts(found: Adequacy) -> list[str]:
+    """What a law leaves unexplained, the largest in noises first."""
+    left = sorted((o for o in found.outputs if o.discrepancy > 0), key=lambda o: -o.discrepancy_in_noises)
+    parts = [say(words.OF_VERDICTS["part"], one=o, amount=amount_text(o.discrepancy, o.output)) for o in left]
     if (found.scatters_too_much or (found.remedies and not parts)) and not found.explanations:
-        parts.append(f"rates of tests that scatter by a factor of {np.exp(found.rate_scatter):.2g}")
-    if found.contradicting is not None:
-        parts.append(contradiction_text(found.contradicting))
-    if found.explanations and not parts:
-        curves = f"; curves agree with the noise ({_p_value(found)})" if found.outputs else ""
-        return f"is rejected by the rates of the tests: {explanation_text(found)}{curves}"
-    where = f". Most in {_largest(found.largest)}" if found.largest is not None else ""
-    if found.remedies and not found.explanations:
-        effects = " or with ".join(one.description for one in found.remedies)
-        where += f". It would explain them with {effects}, which nobody modelled"
-    rest = f"leaves {' and '.join(parts) or 'more than noise'} unexplained: {_chi_square(found)}, {_p_value(found)}"
-    beside = f"; {'of its rates, ' * (not found.is_explained)}{explanation_text(found)}" if found.explanations else ""
-    return f"{rest}{where}{beside}"
+        parts.append(say(words.OF_VERDICTS["scatter"], factor=np.exp(found.rate_scatter)))
+    return [*parts, *([] if found.contradicting is None else [contradiction_text(found.contradicting)])]
 
 
 def verdict_text(found: Adequacy | None) -> str:
     """The verdict in few words, with the p-value, or what is left in noises; "?" where nothing can be judged."""
     if found is None or found.verdict == "cannot be judged":
         return "?"
-    if found.explains:
-        large = f", but only with a large {found.implausible[0].kind}" if found.implausible else ""
-        return f"not rejected ({p_value_text(found.p_value)}){large}"
-    if found.contradicting is not None:
-        return "rejected: rates contradict rupture times"
-    noises = found.discrepancy_in_noises
-    if found.explanations and (found.lies_in_tests or not noises > 0):
-        return f"rejected: {cause_headline(found.explanations[0])}"
-    return f"rejected: {f'leaves {noises_text(noises)} noises' if noises > 0 else 'rates of tests are not followed'}"
+    kind = "leaves" if found.discrepancy_in_noises > 0 else "rates"
+    if found.explanations and (found.lies_in_tests or kind == "rates"):
+        kind = "cause"
+    kind = "explains" if found.explains else "values" if found.contradicting is not None else kind
+    nuisance = "".join(one.kind for one in found.implausible[:1])
+    return say(words.SHORT_VERDICTS[kind], found=found, cause=_cause(found), nuisance=nuisance)
+
+
+def _cause(found: Adequacy) -> str:
+    return "".join(map(cause_headline, found.explanations[:1]))
 
 
 def explanation_text(found: Adequacy) -> str:
     """The likeliest explanation of the rates of tests, those of other tests, and by how much it beats the next."""
-    if not found.explanations:
-        return ""
-    first, *rivals = found.explanations
-    if not rivals:
-        return cause_sentence(first)
-    ahead = first.odds - rivals[0].odds
-    said = f"{odds_text(ahead)} less likely" if ahead > np.log(3.0) else "about as likely"
-    return f"{cause_sentence(first)}; {said}: {cause_headline(rivals[0])}"
+    if len(found.explanations) < 2:
+        return "".join(map(cause_sentence, found.explanations))
+    first, second = found.explanations[:2]
+    kind = "beside" if first.odds - second.odds > np.log(3.0) else "as likely"
+    known = {"cause": cause_sentence(first), "other": cause_headline(second)}
+    return say(words.CAUSES_AT_LENGTH[kind], odds=first.odds - second.odds, **known)
 
 
 def qualification(found: Adequacy) -> str:
     """What follows "not rejected" where the law takes nuisances of implausible size; "" where it does not."""
-    if not found.implausible:
-        return ""
-    more = len(found.implausible) - 1
-    others = f" (and {more} more such nuisance{'s' * (more > 1)})" if more else ""
-    return f", but only with {nuisance_text(found.implausible[0])}{others}"
+    nuisances = [*map(nuisance_text, found.implausible)]
+    return say(words.OF_VERDICTS["qualified"], nuisance=nuisances[0], more=len(nuisances) - 1) if nuisances else ""
 
 
 def contradiction_text(found: ContradictingValues) -> str:
     """That minimum rates and rupture times are not of one law of this kind."""
-    judged = f"{found.tests} tests that scatter by a factor of {found.scatter:.3g}, {p_value_text(found.p_value)}"
-    means = f"{found.rate_ratio:.2g} of minimum rates and {found.time_ratio:.2g} of rupture times"
     product = abs(np.log(found.rate_ratio * found.time_ratio))
-    trend = ", and their ratio changes with stress or temperature" * bool(product <= np.log(NOTEWORTHY_RATIO))
-    return (
-        "minimum creep rates and rupture times contradict one another by this law: predicted over measured is "
-        f"{means} in the mean{trend} ({judged})"
-    )
+    trend = words.OF_VERDICTS["trend"] * bool(product <= np.log(NOTEWORTHY_RATIO))
+    return say(words.OF_VERDICTS["contradiction"], one=found, trend=trend)
 
 
 def _largest(one: LargestDeviation) -> str:
-    rms = f" (rms {_amount(one.rms, one.output)})" if one.rms > 0 else ""
-    return (
-        f"{one.output} of '{one.test}'{rms} about {time_text(one.time)}, where it lies "
-        f"{_amount(abs(one.deviation), one.output)} {'above' if one.deviation > 0 else 'below'} what was measured"
-    )
+    rms = amount_text(one.rms, one.output) if one.rms > 0 else ""
+    amount, above = amount_text(abs(one.deviation), one.output), "above" if one.deviation > 0 else "below"
+    return say(words.OF_VERDICTS["largest"], one=one, rms=rms, amount=amount, above=above)
 
 
 def _chi_square(found: Adequacy) -> str:
-    remarks = [f"critical value {found.critical_chi_square:.3g}"] if found.critical_chi_square > 0 else []
-    if found.expected_chi_square > NOTEWORTHY_EXPECTATION:
-        expected = f"expected {found.expected_chi_square:.3g} for a correct law"
-        remarks.append(f"{expected}, as the noise itself is estimated")
-    said = f" ({'; '.join(remarks)})" if remarks else ""
-    return f"reduced chi-square {found.chi_square:.3g} with {found.freedom:.0f} degrees of freedom{said}"
+    expected = found.expected_chi_square if found.expected_chi_square > NOTEWORTHY_EXPECTATION else 0.0
+    return say(words.OF_VERDICTS["chi-square"], found=found, expected=expected)
 
 
 def _p_value(found: Adequacy) -> str:
     """The p-value; where it is the least of several times their number, how many and that one itself."""
-    count = len(found.outputs) + 1
-    if count == 2:
-        return p_value_text(found.p_value)
-    known = not np.isnan(found.smallest_p_value)
-    smallest = f"smallest {p_value_text(found.smallest_p_value)}, " if known else ""
-    return f"{smallest}{p_value_text(found.p_value)} adjusted for {count} comparisons (Bonferroni)"
+    p, count = say("{found.p_value:p}", found=found), len(found.outputs) + 1
+    return p if count == 2 else say(words.OF_VERDICTS["adjusted"], found=found, p=p, count=count)
 
 
 def scatter_text(scatter: float) -> str:
@@ -324,20 +258,10 @@ def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, i
     few_frames : tests that have too few frames to show it, each with how many.
     """
     frames = [name for name in outputs if name not in SINGLE_VALUES]
-    if frames or not outputs:
-        named = first_of([f"'{name}' ({count})" for name, count in few_frames], MOST_WITHOUT_NOISE, " tests")
-        return (
-            f"no noise is stated, and too few readings{f' of {named}' if named else ''} show it: noise that is "
-            f"estimated from fewer than {LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME:.0f} readings of a test cannot judge "
-            f"whether a law explains it (state it in a column such as {[*frames, 'strain'][0]}_sd, in Python as "
-            "standard_deviation)"
-        )
-    if MINIMUM_RATE_OUTPUT in outputs:
-        return (
-            "no noise of the minimum rates is stated, and scatter between tests was estimated from them. State it in a "
-            "column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd"
-        )
-    return "rupture times alone show no noise beside the scatter between tests, which was estimated from them"
+    tests = first_of([f"'{name}' ({count})" for name, count in few_frames], MOST_WITHOUT_NOISE, " tests")
+    kind = "frames" if frames or not outputs else "rates" if MINIMUM_RATE_OUTPUT in outputs else "ruptures"
+    fewest = LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME
+    return say(words.NOISE_UNKNOWN[kind], tests=tests, fewest=fewest, column=[*frames, "strain"][0])
 
 
 # ---- several laws ----------------------------------------------------------------------------------------------------
@@ -348,71 +272,66 @@ def unmet_text(ranking: Ranking, condition: str) -> str:
     if condition == "adequacy":
         return _of_best(ranking)
     if condition == "challenges" and ranking.challenges is not None:
-        return "; and ".join(challenge_text(one) for one in ranking.challenges if one.refutes)
-    return {
-        "alternatives": f"only {ranking.best.law.name} was fitted",
-        "convergence": "the search for its values did not converge",
-        "weight": f"its weight is not above {DECISIVE_WEIGHT:g}",
-        "asked": "it is none of the laws asked for",
-        "challenges": "what else the tests allow was not examined",
-    }[condition]
+        return "; and ".join(_refuted(ranking))
+    return say(words.UNMET[condition], best=ranking.best.law.name, decisive=DECISIVE_WEIGHT)
+
+
+def _refuted(ranking: Ranking) -> list[str]:
+    return [challenge_text(one) for one in ranking.challenges or () if one.refutes]
 
 
 def ranking_verdict(ranking: Ranking) -> str:
     """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
-    unmet, best, same = ranking.unmet, ranking.best.law.name, same_functions(ranking)
-    if "alternatives" in unmet:
-        return f"{unmet_text(ranking, 'alternatives')}; {_of_best(ranking)}"
-    same = f"; {same}" if same else ""
-    if not unmet:
-        allowed = "".join(f"; but {challenge_text(challenge)}" for challenge in ranking.challenges or ())
-        return f"decisive: {best}, of {len(ranking.laws)} laws tried; {_of_best(ranking)}{same}{allowed}"
-    return f"not decisive: {_reason(ranking)}{same}"
+    unmet, kind = ranking.unmet, "not decisive" if ranking.unmet else "decisive"
+    kind = "alone" if "alternatives" in unmet else kind
+    return say(
+        words.CHOICES[kind],
+        **{"best": ranking.best.law.name, "count": len(ranking.laws), "verdict": _of_best(ranking)},
+        alone=unmet_text(ranking, "alternatives"),
+        reason=_reason(ranking) if kind == "not decisive" else "",
+        same=same_functions(ranking),
+        allowed=[*map(challenge_text, ranking.challenges or ())],
+    )
 
 
 def same_functions(ranking: Ranking) -> str:
     """Which laws the best one stands for, in a clause; "" where none."""
     names = [ranked.fit.law.name for ranked in ranking.laws if ranked.same_as == ranking.best.law.name]
-    has = "with its values is" if len(names) == 1 else "with their values are"
-    return f"{' and '.join(names)} {has} the same function over the tests" if names else ""
+    return say(words.CHOICES["same" if len(names) == 1 else "several same"], names=names) if names else ""
 
 
 def _of_best(ranking: Ranking) -> str:
     """What the tests say of the best law, in words that begin with "it"."""
     found = ranking.adequacy
-    return "whether the tests reject it is not known" if found is None else f"it {adequacy_text(found)}"
+    return words.CAUTIONS["unknown"] if found is None else f"it {adequacy_text(found)}"
 
 
 def _reason(ranking: Ranking) -> str:
     """Why a ranking of several laws is not decisive."""
-    names, best, unmet = [r.fit.law.name for r in ranking.credible], ranking.best.law.name, ranking.unmet
-    tried = f"of {len(ranking.laws)} laws tried"
-    lost = f"; {unmet_text(ranking, 'convergence')}" if "convergence" in unmet else ""
-    adequacy, weight = ranking.adequacy, f"weight {ranking.laws[0].weight:.2f} of the laws tried{lost}"
-    named = unmet_text(ranking, "challenges") if "challenges" in unmet and ranking.challenges else ""
+    names, adequacy, unmet = [r.fit.law.name for r in ranking.credible], ranking.adequacy, ranking.unmet
+    refuted = _refuted(ranking) if "challenges" in unmet else []
+    kind = "apart" if len(names) > 1 else "challenged" if refuted and ranking.singled_out else "best"
     if adequacy is not None and adequacy.rejects:
-        if adequacy.lies_in_tests:
-            first = cause_headline(adequacy.explanations[0])
-            return f"{tried} {best} is best ({weight}), but {first}: {explanation_text(adequacy)}"
-        others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
-        remedied = [(r.fit.law.name, a.remedies) for r in ranking.laws if (a := r.fit.adequacy) and a.remedies]
-        if remedied and not named and not adequacy.remedies:
-            law, remedies = remedied[0]
-            effects = " or ".join(one.description for one in remedies)
-            others += f"; with {effects}, which nobody modelled, {law} would explain them"
-        none = f"none {tried} explains the tests{f' as they are stated; {named}' if named else ''}"
-        return f"{none}. The best, {best} ({weight}{others}), {adequacy_text(adequacy)}"
-    if "asked" in unmet and adequacy is not None and adequacy.explains:
-        more = len(ranking.further)
-        asked = len(ranking.laws) - more
-        found = f"of {more} more that were tried, {best} is not rejected by them ({weight})"
-        none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
-        return f"{none} the tests; {found}: plan tests that can refute it"
-    if len(names) > 1:
-        found = f"{f'{named}; ' if named else ''}the best is {best}: {_of_best(ranking)}{lost}"
-        return f"{tried} these tests cannot tell apart {' and '.join(names)}; {found}"
-    if named and ranking.singled_out and adequacy is not None:
-        explains = f"is not rejected by the tests{qualification(adequacy)}"
-        return f"{tried} {best} has nearly all the weight ({weight}); it {explains}; but {named}"
-    others_unmet = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
-    return f"{tried} {best} is best ({weight}); {'; '.join([_of_best(ranking), *others_unmet])}"
+        kind = "in tests" if adequacy.lies_in_tests else "none"
+    elif "asked" in unmet and adequacy is not None and adequacy.explains:
+        kind = "asked"
+    own = () if adequacy is None else adequacy.remedies
+    found = {
+        r.fit.law.name: [o.description for o in a.remedies]
+        for r in ranking.laws
+        if (a := r.fit.adequacy) and a.remedies and not (kind == "asked" and r.fit.law.name in ranking.further)
+    }
+    remedied = "" if kind == "none" and (own or refuted) else next(iter(found), "")
+    asked, lost = len(ranking.laws) - len(ranking.further), words.UNMET["convergence"] * ("convergence" in unmet)
+    others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
+    texts = {"explanation": explanation_text, "qualified": qualification, "cause": _cause}
+    of_adequacy = {name: "" if adequacy is None else text(adequacy) for name, text in texts.items()}
+    return say(
+        words.CHOICES[kind],
+        **{"best": ranking.best.law.name, "count": len(ranking.laws), "verdict": _of_best(ranking), "lost": lost},
+        weight=say(words.CHOICES["weight"], weight=ranking.laws[0].weight, lost=lost),
+        **{"refuted": refuted, "unmet": "; ".join(others), "names": names, "others": names[1:]},
+        **{"remedied": remedied, "remedies": found.get(remedied, ()), "further": len(ranking.further)},
+        **of_adequacy,
+        none=say(words.CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
+    )

@@ -1,7 +1,8 @@
-"""What a result says first: every sentence of headlines, cautions and next steps.
+"""What results say: every sentence of headlines, cautions, next steps, verdicts and remarks.
 
-Whoever words a result edits these texts and no code. A sentence has 25 words at most and no full stop; braces hold what
-the result puts in.
+Whoever words a result edits these texts and no code. A sentence has 25 words at most and no full stop. Braces hold what
+the result puts in, behind a colon with how it is written (wording.FORMATS); what stands between < and > is left out
+where that is nothing.
 """
 
 from __future__ import annotations
@@ -22,18 +23,14 @@ HEADLINES = {
 }
 """{kind: the first line of an answer}; range : of the tests."""
 
-
 ONE_TEST = "a new {level}'s {quantity} within a factor of {factor} (95 %)"
 """Behind the range of a law, of three tests or more; of fewer their mean misfit stands there."""
-
 
 MEAN_MISFIT = "mean misfits: {misfits}"
 """Of the tests that were fitted, behind how many they are."""
 
-
 FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
 """What was measured, with the root mean square of predicted over measured in the fitted tests."""
-
 
 TRUTHS = {
     # no noise is stated, and too few readings show it
@@ -46,7 +43,6 @@ TRUTHS = {
     "rejected": "the tests reject it as exact",
 }
 """{kind: whether the law could be the true one}, at the end of a headline."""
-
 
 CAUTIONS = {
     # a value lies within 0.1 % of a bound of its search that is not physical
@@ -74,16 +70,12 @@ CAUTIONS = {
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {change} {side}",
     # offsets or drifts would move rates
-    "not included": "intervals leave out {kinds}: the law's rate moves by {change}{alone}",
+    "not included": "intervals leave out {kinds}<, another in {each}>: the law's rate moves by {change}<, that of "
+    "one test by {alone}>",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
 """{kind: a caution}, the most serious first."""
-
-
-IN_EACH_TEST, ONE_ALONE = ", another in each test", ", that of one test by {change}"
-"""Of several tests; and what it does to one by itself, where that is known."""
-
 
 REASONS = {
     # a law of creep and rupture misses both, in opposite ways
@@ -99,10 +91,21 @@ REASONS = {
 }
 """{kind: why the tests reject a law}; of several the others are cautions of their own."""
 
-
 NEXT = {
+    # groups of tests differ that their labels tell apart
+    "check stated groups": 'identify each {key} apart (group_by = "{key}" in a study, or --only "{key}={value}")',
+    # nothing tells them apart
+    "check groups": "look how {one.tests:two} differ (material, heat, rig), then identify each group apart",
+    # a test disagrees with all others
+    "check one test": "check test '{one.tests[0]}' again (label, unit, thermocouple), then identify without",
+    # several do
+    "check tests": "check tests {one.tests:quoted} again (label, unit, thermocouple), then identify without",
+    # one does, too little for a verdict, and a few kelvin would do it
+    "check temperature": "check the temperature of {one.tests[0]}",
+    # nothing so simple would
+    "check record": "check the record of {one.tests[0]}",
     # the search did not converge
-    "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
+    "search": "repeat the search with more starts (--starts {starts}, or starts in a study)< and bounds for {names}>",
     # the law is rejected, and one that was not tried has what it lacks
     "law": "try {law} as well, for {why}",
     # it is rejected, and no other was tried
@@ -136,34 +139,26 @@ NEXT = {
 }
 """{kind: what to do now}."""
 
-
 BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
 """Below the numbers of an answer."""
-
 
 NEW_TEST = "{condition}, one new test"
 """Where a number holds whose interval has the scatter between tests in it."""
 
-
 OVER_ALL_TESTS, MEAN_SLOPE = "over all tests", "slope of the measured rates: {value}"
 """Where a stress exponent or activation energy is that of the measured rates; and beside the law's at one condition."""
-
 
 MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 """Above the picture of minimum rates."""
 
-
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
-
-CODES, MORE_CODES = "In {codes}", "creepkit export, also for other codes"
+CODES = "In {codes} (creepkit export, also for other codes)"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
-
 
 ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
-
 
 CONSTANT_LOAD = (
     "under a constant load the true stress rises with strain, here by up to {growth}: "
@@ -171,21 +166,19 @@ CONSTANT_LOAD = (
 )
 """Beside the exponent of such tests."""
 
-
 COMPARED = {
     # a law with a smaller misfit than the best, and why it is behind
     "readings": "{law} has the smaller misfit of {what}, but its chi-square over all readings is {more} higher",
     # its chi-square is not higher
     "parameters": "{law} has the smaller misfit of {what}, but its parameters cost more ({excess} behind)",
     # nobody asked for it
-    "left out": "{law} has the smaller misfit of {what}, but nobody asked for it, and it predicts left-out tests worse",
+    "left out": "{law} has the smaller misfit of {what}, but was not asked for and predicts left-out tests worse",
     # it gives no number for some readings
     "unpredicted": "{law} has the smaller misfit of {what}, but does not predict every test",
     # below their table
     "chi-square": "laws are ranked by all readings under one covariance, not by mean misfits; verdicts by noise alone",
 }
 """{kind: what is said of laws that were compared}."""
-
 
 RUPTURE = {
     # weights of 0.05 or more
@@ -208,7 +201,6 @@ RUPTURE = {
     "strengths": "use these strengths with their bounds",
 }
 """{kind: what an assessment of rupture tests says first}, its first line, cautions and what to do next."""
-
 
 FORECAST = {
     # one test
@@ -238,9 +230,7 @@ FORECAST = {
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a rejected law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}{allowed}",
-    # its end, where that is more than nothing
-    "allowed": "; intervals allow for {here} here",
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}<; intervals allow for {here} here>",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
@@ -254,6 +244,24 @@ FORECAST = {
 }
 """{kind: what a forecast says}, its first line and how far to trust it, by which laws, cautions, what to do next."""
 
+PLATE = {
+    # always
+    "headline": "best law: {first} in {count} of {materials}<, {others:commas}>, for {range}<; "
+    "the tests reject it in {rejecting}>",
+    # of some
+    "failed": "of {failed} more no law was identified",
+    # the search did not converge
+    "not converged": "of {names} the search did not end: these values may not be the best",
+    # not all choices are
+    "choice": "the choice of the law is decisive in {decisive} of {choices}",
+    # some searches did not
+    "next search": "repeat the search of these with more starts (--starts, or starts in a study)",
+    # the tests reject most
+    "next laws": "compare further laws (creepkit list laws): the tests reject those of most materials",
+    # neither
+    "next use": "use each law within its tests; what to do next of each stands with it",
+}
+"""{kind: what the laws of several materials say first}, cautions and what to do next."""
 
 DESIGN = {
     # one run
@@ -299,7 +307,6 @@ DESIGN = {
 }
 """{kind: what a design of further tests says}, its first line, what it tells, and what to do next."""
 
-
 TRY = {
     # rates say so
     "exponent rises": "the stress exponent rises with stress",
@@ -311,3 +318,279 @@ TRY = {
     "late": "this one misses the end of the curves",
 }
 """{kind: why a law is to be tried}."""
+
+CAUSES = {
+    # one test disagrees with all others
+    "one test": "test '{one.tests[0]}' does not agree with the others",
+    # several do
+    "tests": "tests {one.tests:quoted} do not agree with the others",
+    # two groups of tests do, which nothing tells apart
+    "groups": "tests are of two groups: {one.tests:two} creep {factor:.2g} times as fast",
+    # two groups that labels of the tests tell apart, the faster first
+    "stated groups": "{first} creeps {factor:.2g} times as fast as {other}",
+    # curves and rates of tests disagree on the exponent
+    "curves": "the {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests",
+    # it changes more than the law lets it
+    "stress exponent": "the stress exponent {rises} from {low:.2g} at {start:.4g} MPa to {high:.2g} at {end:.4g} MPa",
+    # so does the energy
+    "activation energy": "the activation energy {rises} from {low:kJ/mol} at {start:C} to {high:kJ/mol} at {end:C}",
+}
+"""{kind: why tests reject a law, or which of them do}, in a headline."""
+
+CAUSES_AT_LENGTH = {
+    # as above
+    "one test": "test '{one.tests[0]}' ({one.condition}) creeps {factor:.3g} times as fast as the others say"
+    "< (or '{near}' is to blame)><; it would agree with them {errors}><; without it {without}>",
+    # as above
+    "tests": "tests {one.tests:quoted} creep {one.factors:factors} times as fast as the others say"
+    "<; without it {without}>",
+    # as above
+    "groups": "tests ({one.tests:six}) creep {factor:.3g} times as fast as the others at equal conditions: "
+    "are they of one material?",
+    # as above
+    "stated groups": "{cause} at equal conditions ({one.label}: {one.tests:six})",
+    # the exponent or the energy
+    "changes": "{cause}, more than this law lets it",
+    # any, with the next likely one
+    "beside": "{cause}; {odds:odds} less likely: {other}",
+    # where that is about as likely
+    "as likely": "{cause}; about as likely: {other}",
+}
+"""{kind: the same with its numbers}, where a verdict is given at length."""
+
+CAUSE_CAUTIONS = {
+    # one test
+    "one test": "{one.tests[0]} creeps {sizes} times as fast as the others lead to expect<; {kelvin} would do it>",
+    # several
+    "tests": "{one.tests:and} creep {sizes} times as fast as the others lead to expect<; {kelvin} would do it>",
+    # any other, of odds that are no verdict
+    "others": "{cause}: {odds:.2g} times likelier than scatter, too little for a verdict",
+}
+"""{kind: the same as a caution}."""
+
+ERRORS = {
+    # of strain, load or time by a factor
+    "factor": "if its {quantity} were {factor:.3g} times {smaller}< (nearly {unit:g}: a unit?)>",
+    # of a few kelvin
+    "temperature": "at {actual:C}, {kelvin}",
+    # as it says
+    "kelvin": "{kelvin:.2g} K {less} than stated",
+    # of up to 30 %
+    "load": "at a load {change:%} {lower}",
+}
+"""{kind: with which error of what is stated a test would agree}."""
+
+VERDICTS = {
+    # a simulation ends before a reading
+    "unpredicted": "cannot be judged: it does not predict every reading of test {found.unpredicted:first}",
+    # the noise is not known
+    "not judged": "cannot be judged: {why}",
+    # the p-value is 0.3 % or more
+    "explains": "is not rejected by the tests at their {sources:and} noise<{qualified}>"
+    "< (rates of tests scatter by {scatter})><{doubt}>: {chi_square}, {p}<{slow}>",
+    # minimum rates and rupture times contradict one another, and there are no curves
+    "values": "is rejected by the tests: {contradiction}",
+    # rates of tests alone reject it
+    "rates": "is rejected by the rates of the tests: {cause}<; curves agree with the noise ({curves})>",
+    # any other
+    "leaves": "leaves {parts} unexplained: {chi_square}, {p}<. Most in {largest}>"
+    "<. It would explain them with {remedies:or with}, which nobody modelled><; {cause}>",
+}
+"""{kind: the verdict at length}, behind "the law" or "it"."""
+
+OF_VERDICTS = {
+    # of each output that is missed
+    "part": "{amount} of {one.output} ({one.discrepancy_in_noises:noises} times its {one.noise_source} noise)",
+    # of rates of tests
+    "scatter": "rates of tests that scatter by a factor of {factor:.2g}",
+    # none of these
+    "noise": "more than noise",
+    # where it misses most
+    "largest": "{one.output} of '{one.test}'< (rms {rms})> about {one.time:h}, where it lies {amount} {above} what was "
+    "measured",
+    # nuisances are implausible
+    "qualified": ", but only with {nuisance}< (and {more} more such nuisances)>",
+    # chi-square is far below one
+    "doubt": " (far larger than what the readings show: check its unit)",
+    # what is left is autocorrelated
+    "slow": "; what is left is autocorrelated, noise or the law's own",
+    # a cause of rates beside curves that are missed
+    "rates": "of its rates, {cause}",
+    # chi-square, everywhere; what is expected where noise is estimated from few readings
+    "chi-square": "reduced chi-square {found.chi_square:.3g} with {found.freedom:.0f} degrees of freedom"
+    "<, critical value {found.critical_chi_square:.3g}><, expected {expected:.3g} as noise is estimated>",
+    # of several outputs
+    "adjusted": "<smallest {found.smallest_p_value:p}, >{p} adjusted for {count} comparisons (Bonferroni)",
+    # minimum rates and rupture times
+    "contradiction": "minimum creep rates and rupture times contradict one another by this law: predicted over "
+    "measured is {one.rate_ratio:.2g} of minimum rates and {one.time_ratio:.2g} of rupture times in the mean<{trend}> "
+    "({one.tests} tests that scatter by a factor of {one.scatter:.3g}, {one.p_value:p})",
+    # their products are one in the mean
+    "trend": ", and their ratio changes with stress or temperature",
+}
+"""{kind: a part of a verdict}."""
+
+SHORT_VERDICTS = {
+    # the p-value is 0.3 % or more
+    "explains": "not rejected ({found.p_value:p})<, but only with a large {nuisance}>",
+    # as it says
+    "values": "rejected: rates contradict rupture times",
+    # what it misses has one cause
+    "cause": "rejected: {cause}",
+    # it misses readings
+    "leaves": "rejected: leaves {found.discrepancy_in_noises:noises} noises",
+    # it misses none
+    "rates": "rejected: rates of tests are not followed",
+}
+"""{kind: the verdict in few words}, in tables."""
+
+NOISE_UNKNOWN = {
+    # of curves
+    "frames": "no noise is stated, and too few readings< of {tests}> show it: noise that is estimated from fewer than "
+    "{fewest:.0f} readings of a test cannot judge whether a law explains it; state it in a column such as {column}_sd, "
+    "in Python as standard_deviation",
+    # of minimum rates
+    "rates": "no noise of the minimum rates is stated, and scatter between tests was estimated from them. State it in "
+    "a column such as minimum_rate_sd_1/s, in Python as minimum_rate_sd",
+    # of rupture times alone
+    "ruptures": "rupture times alone show no noise beside the scatter between tests, which was estimated from them",
+}
+"""{kind: why nothing is known of the noise, and where to state it}."""
+
+CHOICES = {
+    # all conditions are met
+    "decisive": "decisive: {best}, of {count} laws tried; {verdict}<; {same}><; but {allowed:but}>",
+    # one law was fitted
+    "alone": "{alone}; {verdict}<; {same}>",
+    # any other
+    "not decisive": "not decisive: {reason}<; {same}>",
+    # what the best law misses lies in tests
+    "in tests": "of {count} laws tried {best} is best ({weight}), but {cause}: {explanation}",
+    # the best law is rejected
+    "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best is {best} "
+    "({weight}<, not told apart from {others:and}><; with {remedies:or}, which nobody modelled, {remedied} would "
+    "explain them>); {verdict}",
+    # a law that nobody asked for is not
+    "asked": "{none} the tests<; with {remedies:or}, which nobody modelled, {remedied} would explain them>; of "
+    "{further} more that were tried, {best} is not rejected by them ({weight}): plan tests that can refute it",
+    # of several that were asked for
+    "none asked": "none of the {asked} laws asked for explains",
+    # of one
+    "one asked": "the law asked for does not explain",
+    # several have weight
+    "apart": "of {count} laws tried these tests cannot tell apart {names:and}; <{refuted:and}; >the best is {best}: "
+    "{verdict}<; {lost}>",
+    # one has, and is challenged
+    "challenged": "of {count} laws tried {best} has nearly all the weight ({weight}); it is not rejected by the tests"
+    "<{qualified}>; but {refuted:and}",
+    # none of these
+    "best": "of {count} laws tried {best} is best ({weight}); {verdict}<; {unmet}>",
+    # the weight of the best
+    "weight": "weight {weight:.2f} of the laws tried<; {lost}>",
+    # another law is the same function
+    "same": "{names:and} with its values is the same function over the tests",
+    # several are
+    "several same": "{names:and} with their values are the same function over the tests",
+}
+"""{kind: which law it is}, at length."""
+
+UNMET = {
+    # as it says
+    "alternatives": "only {best} was fitted",
+    # as it says
+    "convergence": "the search for its values did not converge",
+    # as it says
+    "weight": "its weight is not above {decisive:g}",
+    # it was tried beside those asked for
+    "asked": "it is none of the laws asked for",
+    # as it says
+    "challenges": "what else the tests allow was not examined",
+}
+"""{condition of a decisive choice: that it is not met}."""
+
+CHALLENGES = {
+    # a usual error with which other laws explain the tests
+    "remedy": "with {sizes:or with} {one.laws:or} would explain them< (weight {weight:.2f})>",
+    # one that takes the weight from the best
+    "effect": "{effect}, which was not modelled, would leave it a weight of {own:.2f} ({one.other}: {weight:.2f})",
+    # it was not examined
+    "unknown": "whether {altered} explains them as well could not be examined",
+    # as it says
+    "better": "{altered} fits better (its chi-square is {difference:.1f} {side})",
+    # chi-squares agree
+    "same": "{altered} explains them as well (its chi-square is the same)",
+    # the chi-square is higher
+    "higher": "{altered} is not excluded (its chi-square is {difference:.1f} higher)",
+    # or lower
+    "lower": "{altered} explains them as well (its chi-square is {difference:.1f} lower)",
+    # what is altered: a share of another law
+    "sum": "a share of {one.size:whole %} of the rate by {one.other}",
+    # which was not examined
+    "unknown sum": "a sum with {one.other}",
+    # or a threshold
+    "threshold": "{one.subject} of {one.size:.3g} MPa",
+}
+"""{kind: what the tests allow beside the best law}, behind "but"."""
+
+SIZES = {
+    # of a length, of each test
+    "lengths": "independent errors of up to {size:.2g} % in the {what} of {where}",
+    # the same of all
+    "length": "a {what} {size:.2g} % {smaller}< in {each}>",
+    # of temperature
+    "drifts": "independent drifts of the temperature of up to {amount} over {where}",
+    # as above
+    "drift": "a drift of the temperature of {amount} over {where}",
+    # of readings
+    "offsets": "independent offsets of up to {amount} in the {what} of {where}",
+    # as above
+    "offset": "an offset of {amount} in the {what} of {where}",
+}
+"""{kind: a perturbation with the size that it takes}; plural where each test has its own."""
+
+PERTURBATIONS = {
+    # of temperature, of one test
+    "drift": "a linear drift of {one.size:.2g} K over the test",
+    # of several
+    "drifts": "independent drifts of temperature, {one.size:.2g} K over each of {one.tests} tests",
+    # of what is stated or read, of one test
+    "error": "an {error} of {one.amount} in the {what} of the test",
+    # of several
+    "errors": "independent {error}s of {one.amount} in the {what} of each of {one.tests} tests",
+    # how any moves the rate
+    "moves": "by {change}<{deviation}> with {cause}< ({energy:%} a kelvin, {whence})>",
+    # those that are not in intervals
+    "not included": "the intervals do not include what would move the rate amid the tests: {effects}",
+}
+"""{kind: what nobody measured}, with what it does to the rate."""
+
+REMARKS = {
+    # of one start, or of all the same
+    "one search": "the search ended once: whether another minimum is lower was not examined (raise starts)",
+    # an interval ends at a bound of the search
+    "cut": "the interval of {name} ends at its bound, {bound:.4g}, and not by the tests: intervals of rates and of "
+    "the local exponent do not know this bound and may reach beyond it",
+    # a reduced-order model was corrected
+    "numerical": "at the optimum {one.predictor} differs from {one.refined} by {sizes} (rms); at most "
+    "{one.noises:.2g} noises. This is corrected, and would have moved values by up to {one.shift:.2g} of their "
+    "standard deviations<; {one.incomplete:commas} could not be corrected><{unsettled}>",
+    # it has not settled
+    "unsettled": "; a further correction may move them again",
+    # a nuisance three standard deviations from what was stated
+    "implausible": "the {one.kind}< of {one.output}> of '{one.owner}' is {amount}<, {share}>, "
+    "{one.standard_deviations:.2g} times {expected} ({size}): it stands for more than its name says, look at the test "
+    "or try another law",
+    # such a one in another sentence
+    "nuisance": "{article} {one.kind} of {amount} in <{one.output} of >'{one.owner}'<, {share}>",
+    # what it was compared with: as stated
+    "stated": "the standard deviation that was stated for it",
+    # an offset
+    "noise": "the noise of a frame",
+    # any other
+    "usual": "a usual {one.kind}",
+    # its share of an output
+    "of value": "{one.share:%} of its largest value",
+    # of a length
+    "of length": "{one.share:%} from its nominal length",
+}
+"""{kind: a remark on an identification}, beside its values."""

@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import ExportError
-from creepkit.exporters import creep_subroutine
-from creepkit.exporters.creep_subroutine import (
-    AbaqusCreepSubroutine,
-    CalculixCreepSubroutine,
-    fortran_statements,
-    law_subroutine,
-    stable_function_definitions,
-)
+from creepkit.exporters.creep_subroutine import ABAQUS_CREEP, CALCULIX_CREEP
+from creepkit.exporters.fortran import FORTRAN_RESERVED, fortran_statements, law_subroutine, stable_function_definitions
 from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
@@ -37,7 +31,7 @@ def law(term, params, name="foreign", **more):
 
 
 def routine_of(values, name):
-    return law_subroutine(LawCode(values, Identifiers(creep_subroutine.FORTRAN_RESERVED, ignore_case=True)), name)
+    return law_subroutine(LawCode(values, Identifiers(FORTRAN_RESERVED, ignore_case=True)), name)
 
 
 # ---- the law -------------------------------------------------------------------------------------------------------
@@ -103,9 +97,9 @@ def test_every_file_is_fixed_form():
         given = LawWithValues(law, law.center(), notes=["a note " * 30])
         if law.uses(principal_stress):
             with pytest.raises(ExportError, match="largest principal stress"):
-                AbaqusCreepSubroutine().text(given)
+                ABAQUS_CREEP.text(given)
             continue
-        text = AbaqusCreepSubroutine().text(given)
+        text = ABAQUS_CREEP.text(given)
         assert text.isascii() or not law.title.isascii(), law.name
         for line in text.splitlines():
             assert len(line) <= 72, (law.name, line)
@@ -115,7 +109,7 @@ def test_every_file_is_fixed_form():
 def test_files_compile_without_a_warning(tmp_path, gfortran):
     sources = []
     for k, name in enumerate(["combined with temperature", "registered drifting-exponent", "foreign names of Python"]):
-        for exporter in (AbaqusCreepSubroutine(), CalculixCreepSubroutine()):
+        for exporter in (ABAQUS_CREEP, CALCULIX_CREEP):
             sources.append(tmp_path / f"{exporter.name}{k}.f")
             sources[-1].write_text(exporter.text(LawWithValues(LAWS[name], LAWS[name].center())))
     (tmp_path / "ABA_PARAM.INC").write_text("      implicit real*8(a-h,o-z)\n")
@@ -125,7 +119,7 @@ def test_files_compile_without_a_warning(tmp_path, gfortran):
 
 
 def test_the_head_says_law_units_values_notes_and_what_the_input_file_needs():
-    text = AbaqusCreepSubroutine().text(
+    text = ABAQUS_CREEP.text(
         LawWithValues(TIME_HARDENING, {"A": 1.5e-12, "n": 4.0, "m": -0.3}, ["n = 4, 95 % interval 3.8 to 4.2"])
     )
     words = " ".join(re.sub(r"^! *", "", line) for line in text.splitlines() if line.startswith("!"))
@@ -141,7 +135,7 @@ def test_the_head_says_law_units_values_notes_and_what_the_input_file_needs():
 
 
 def test_names_that_clash_without_case_are_renamed_openly():
-    text = AbaqusCreepSubroutine().text(
+    text = ABAQUS_CREEP.text(
         LawWithValues(law(A * stress**n * a, {A: RATE, n: POWER, a: POWER}), NORTON_VALUES | {"a": 2})
     )
     assert "! 'a' is called a_2 here" in text
@@ -149,14 +143,12 @@ def test_names_that_clash_without_case_are_renamed_openly():
 
 
 def test_a_name_is_made_an_identifier_and_short_enough():
-    text = AbaqusCreepSubroutine().text(
-        LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long ")
-    )
+    text = ABAQUS_CREEP.text(LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long "))
     assert re.search(r"subroutine x_2nd_law_of_wurzbur\w*_law\(x, out\)", text)
     assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 31
 
 
-@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
+@pytest.mark.parametrize("exporter", [ABAQUS_CREEP, CALCULIX_CREEP])
 def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran):
     """Abaqus has files preprocessed, and to a preprocessor C comments are comments."""
     notes = (
@@ -178,7 +170,7 @@ def test_nothing_in_a_note_or_a_title_becomes_code(exporter, tmp_path, gfortran)
 
 
 def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path, gfortran):
-    text = AbaqusCreepSubroutine().text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
+    text = ABAQUS_CREEP.text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
     driver = """
       program trapped
         double precision x(6), out(7)
@@ -196,15 +188,15 @@ def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_
 def test_what_creep_is_not_told_is_refused():
     first = law(A * principal_stress**n, {A: RATE, n: POWER})
     with pytest.raises(ExportError, match="largest principal stress, which Abaqus does not pass to CREEP"):
-        AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
+        ABAQUS_CREEP.text(LawWithValues(first, NORTON_VALUES))
     mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
-    assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+    assert "given(2) = -p" in ABAQUS_CREEP.text(LawWithValues(mean, NORTON_VALUES))
     with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass.*export it as 'calculix-umat'"):
-        CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+        CALCULIX_CREEP.text(LawWithValues(mean, NORTON_VALUES))
     shared = law(A * (a * principal_stress + (1 - a) * stress) ** n, {A: RATE, n: POWER, a: Param("share", (0, 1))})
-    text = AbaqusCreepSubroutine().text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
+    text = ABAQUS_CREEP.text(LawWithValues(shared, {**NORTON_VALUES, "a": 0.0}))
     assert "switched off and left out: a = 0" in text, "a share that is zero by value leaves the von Mises stress"
-    calculix = CalculixCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES))
+    calculix = CALCULIX_CREEP.text(LawWithValues(NORTON, NORTON_VALUES))
     head = " ".join(re.sub(r"^! *", "", calculix, flags=re.MULTILINE).split())
     assert "ignores a preloaded CREEP" in head
     assert "insists on CETOL" in head

@@ -17,7 +17,7 @@ from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.records import Status
 from creepkit.reports.answer import asked_figures
-from creepkit.reports.forecast import forecast_to_json
+from creepkit.reports.documents import document
 from helpers.rupture_tests import BAR
 
 TIMES = np.geomspace(3.6e3, 3.6e5, 40)
@@ -276,7 +276,7 @@ def test_nonsense_is_refused(fit, options, sentence):
 def test_a_saved_identification_forecasts_the_same(fit, tmp_path):
     plan = bar("plan", 105.0, noise=0.0)
     loaded = ck.load(fit.save(tmp_path / "fit.json"))
-    assert forecast_to_json(loaded.forecast(plan, using=BAR)) == forecast_to_json(fit.forecast(plan, using=BAR))
+    assert document(loaded.forecast(plan, using=BAR)) == document(fit.forecast(plan, using=BAR))
 
 
 def test_extrapolation_is_said_by_how_much(fit):

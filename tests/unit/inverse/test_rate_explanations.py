@@ -196,3 +196,11 @@ def test_the_evidence_is_that_of_the_dense_covariance():
     gain = scatter.evidence(one, np.array([1.5])).log - scatter.evidence(none, np.zeros(0)).log
     assert np.all(linear.prior_residual == 0.0)
     assert gain == pytest.approx(dense(one, [1.5]) - dense(none, []), abs=0.02)  # but for the jitter of C
+
+
+def test_an_activation_energy_at_its_bound_of_zero_is_judged_without_errors_of_temperature():
+    """Rates that fall as temperature rises, as where a heat treatment goes on in the test."""
+    law = ck.law("norton").times(ck.arrhenius(T_ref=T_REF)).with_bounds(Q=(0.0, 9e5))
+    fit = ck.identify(law, bars(power_law(5.0, -5e4)))
+    assert fit.values["Q"] == 0.0
+    assert all(np.isfinite(one.odds) for one in fit.adequacy.explanations)

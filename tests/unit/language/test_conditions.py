@@ -63,7 +63,7 @@ def test_two_conditions_survive_files_and_have_a_place_in_solvers_or_need_a_numb
     law = IRRADIATED
     assert law_from_json(json.loads(json.dumps(law_to_json(law)))) == law == pickle.loads(pickle.dumps(law))
     assert "@ExternalStateVariable real grain_size;" in ck.export(law, "mfront", PLANTED)
-    assert "temps(4) = predef(2) - 0.5d0*dpred(2)" in ck.export(law, "abaqus", PLANTED)
+    assert "outside(1, 3) = predef(2) - dpred(2)" in ck.export(law, "abaqus", PLANTED)
     with pytest.raises(ck.errors.ExportError, match="no place for conditions.*give dose, grain_size"):
         ck.export(law, "calculix", PLANTED)
     assert "coefficient = 1.666666666667e-13" in ck.export(law, "moose", PLANTED | {"grain_size": 0.03, "dose": 0.5})
