@@ -29,8 +29,8 @@ BUDGET = {
     "files": 1301,
     "forecasts": 1165,
     "instruments": 1159,
-    "integration": 779,
-    "inverse": 9435,
+    "integration": 790,
+    "inverse": 9438,
     "jobs": 245,
     "kernels": 1687,
     "language": 1557,
@@ -38,21 +38,21 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1150,
-    "readers": 7021,
+    "readers": 7035,
     "records": 2469,
     "registry": 615,
     "reports": 6683,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
-    "specimens": 3203,
+    "specimens": 3176,
     "studies": 2794,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_129
+TESTS = 31_295
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

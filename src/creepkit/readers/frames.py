@@ -81,7 +81,7 @@ def read_frames(
                 *({one: UNUSED} for one in (written, found[quantity])),
             )
         found[quantity] = written
-        sensors.setdefault(quantity, {})[written] = _converted_column(table, name, kinds[quantity], suffix)
+        sensors.setdefault(quantity, {})[written] = _converted_column(table, name, quantity, kinds[quantity], suffix)
         values[quantity] = np.mean([*sensors[quantity].values()], axis=0)
         if quantity == "stress" and (table.numbers(name) < 0.0).any() and not (table.numbers(name) > 0.0).any():
             notes.append(_COMPRESSION)
@@ -244,12 +244,13 @@ _SENSORS = {
 """{name of a sensor in small letters: what it measures}."""
 
 
-def _converted_column(table: CellTable, name: str, kind: QuantityKind, suffix: str) -> Floats:
+def _converted_column(table: CellTable, name: str, quantity: str, kind: QuantityKind, suffix: str) -> Floats:
     """One column in creepkit's unit."""
     k, numbers = table.column(name), table.numbers(name)
     written = table.as_written(k)
     # A reading of none may be below it.
-    if kind.low == 0.0 and kind.name in ("stress", "pressure", "time") and numbers.size:
+    is_imposed = kind.low == 0.0 or quantity == "stress"
+    if is_imposed and kind.name in ("stress", "pressure", "time") and numbers.size:
         numbers = -numbers if kind.name == "stress" and numbers.max() <= 0.0 else numbers
         numbers = np.where((numbers < 0.0) & (numbers >= -NOISE_OF_ZERO * numbers.max()), 0.0, numbers)
     return kind.convert_all(numbers, suffix, lambda row: table.location(int(table.lines[row]), k), written)
