@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7035,
     "records": 2469,
     "registry": 615,
-    "reports": 6682,
+    "reports": 6683,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
