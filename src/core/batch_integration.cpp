@@ -27,7 +27,8 @@ struct BatchIntegration {
     Axes axes;
     IntegrationSettings settings;
     Tableau tableau;
-    double* strain;            // (C, F) in: NaN
+    double* strain;            // (C, F) in: NaN; of a bar axial creep strain
+    double* path;              // (C, F) in: NaN; equivalent creep strain, null unless wanted
     double* values;            // (C, F, S) in: NaN; internal variables at the output times, null unless wanted
     double* jacobian;          // (C, F, P) in: NaN; this and the other derivatives null unless wanted
     int64_t* endings;          // (C, K) codes of event_location.hpp
@@ -77,7 +78,8 @@ CREEPKIT_API int64_t creepkit_integrate_batch(const BatchIntegration* batch) {
                                         {batch->level_offsets[k + 1] - level, batch->levels + level,
                                          batch->arrivals + c * L + level, batch->arrival_slopes + c * L + level,
                                          exact ? batch->arrival_jacobian + (c * L + level) * P : nullptr,
-                                         exact ? batch->end_jacobian + (c * K + k) * P : nullptr}};
+                                         exact ? batch->end_jacobian + (c * K + k) * P : nullptr},
+                                        batch->path ? batch->path + c * F + time : nullptr};
             const PointIntegration integration = {candidate, test, record, batch->settings, batch->tableau,
                                                   predictor, work};
             const IntegrationProgress progress = integration.run();

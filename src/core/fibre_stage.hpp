@@ -24,11 +24,6 @@ namespace creepkit {
 
 constexpr int64_t MAX_LOADS = 8;
 
-// Uniaxial compression: no principal stress is above zero.
-constexpr Axes COMPRESSION = {0.0, 0.0, 0.0, -1.0 / 3.0};
-
-inline const Axes& axes_of(double sign) { return sign < 0.0 ? COMPRESSION : UNIAXIAL; }
-
 // stress, strain : (L, m) stress in MPa, and strain, of each fibre for a unit of each load
 // modes : (m, r); projection : (r, m); observed : (rows, m), what is recorded of c
 // *_change : (A, ...) their derivatives to the inputs; offsets : (A, 2) K, and relative change of the modulus, per unit

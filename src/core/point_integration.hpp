@@ -13,6 +13,7 @@ namespace creepkit {
 
 constexpr double SMALLEST_STEP = 1e-13;        // of the position
 constexpr double SMALLEST_FIRST_STEP = 1e-60;
+constexpr double ROUNDING = 1e-12;             // of what creep took of a stress, below which none is left
 constexpr double NEGLIGIBLE = 0.01;            // share of the tolerance within which a time need not be known better
 
 // Share of a step's tolerance that the increment of a stage may err by. The weights of the methods add up the errors of
@@ -29,7 +30,8 @@ struct Candidate {
 
 // What a point goes through.
 //
-// segments : (segment_count, 6) start, end, driving stress at both, temperature at both
+// segments : (segment_count, 6) start, end, driving stress at both, temperature at both; a stress that is prescribed
+//     keeps its sign within each
 // times    : (time_count,) s, non-decreasing, none beyond the last segment
 struct PointTest {
     StressControl drive;
@@ -37,10 +39,12 @@ struct PointTest {
     const double *segments, *times;
 };
 
-// What is recorded of it: strain (times,), left as it is after the end; jacobian (times, P), or null to do without.
+// What is recorded of it: strain (times,), of a bar the axial creep strain, left as it is after the end; jacobian
+// (times, P), values (times, S) and path (times,), the equivalent creep strain, or null to do without.
 struct PointRecord {
     double *strain, *values, *jacobian;
     LevelEvents arrivals;
+    double* path;
 };
 
 // done, reached : output times filled, levels reached; steps, rejected : how many; code, time : its end, s.
@@ -64,7 +68,13 @@ struct PointIntegration {
     IntegrationProgress run() const {
         IntegrationProgress progress = {start(), 0, 0, 0, REACHED_END, 0.0};
         for (int64_t k = 0; k < test.segment_count && progress.code == REACHED_END; ++k) {
-            through(Segment(test.segments + 6 * k), progress);
+            Segment segment(test.segments + 6 * k);
+            double from = segment.start;
+            do {
+                segment = segment.from(from);
+                const Segment part = turned(segment);
+                from = through(part, test.drive.along(work.sign), progress);
+            } while (from < segment.end && progress.code == REACHED_END);
         }
         return progress;
     }
@@ -74,9 +84,13 @@ private:
     int64_t start() const {
         for (int64_t v = 0; v < work.unknowns(); ++v) work.value[v] = v > 0 ? candidate.limits.initial[v - 1] : 0.0;
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = 0.0;
+        for (int64_t p = 0; p < work.parameters; ++p) work.offset_change[p] = 0.0;
+        work.sign = 1.0;
+        work.offset = 0.0;
         int64_t done = 0;
         for (; done < test.time_count && test.times[done] <= 0.0; ++done) {
             record.strain[done] = 0.0;
+            if (record.path) record.path[done] = 0.0;
             for (int64_t v = 1; record.values && v < work.unknowns(); ++v) {
                 record.values[done * (work.unknowns() - 1) + v - 1] = candidate.limits.initial[v - 1];
             }
@@ -87,16 +101,29 @@ private:
         return done;
     }
 
-    // Integrate over one segment in its transformed time s, from 0 to 1.
-    void through(const Segment& segment, IntegrationProgress& progress) const {
+    // A segment by the size of a bar's stress, in the direction that it has from its start on.
+    Segment turned(const Segment& segment) const {
+        const StressControl& drive = test.drive;
+        if (!drive.of_bar()) return segment;
+        const double creep = work.offset + work.sign * work.value[0], now = segment.stress - drive.stiffness * creep;
+        const double ahead = fabs(now) > ROUNDING * drive.stiffness * work.value[0] ? now : segment.stress_rate;
+        const double sign = ahead == 0.0 ? work.sign : ahead < 0.0 ? -1.0 : 1.0, turn = work.sign - sign;
+        work.offset += turn * work.value[0];
+        for (int64_t p = 0; p < work.parameters; ++p) work.offset_change[p] += turn * work.change[p];
+        work.sign = sign;
+        return segment.directed(sign * exp(drive.load * work.offset), drive.stiffness * work.offset);
+    }
+
+    // Integrate over one segment in its transformed time s, from 0 to 1; the time up to which its stress has one sign.
+    double through(const Segment& segment, const StressControl& drive, IntegrationProgress& progress) const {
         const LawCall& law = candidate.law;
-        const SegmentStart beginning = choose_time_transformation(law.update, law.theta, candidate.beta, test.drive,
+        const SegmentStart beginning = choose_time_transformation(law.update, law.theta, candidate.beta, drive,
                                                                   segment, work.value, work);
         const SegmentClock clock(beginning.clock);
         const bool outputs = progress.done < test.time_count;
         if (record.jacobian) {
             const double due = outputs ? smaller(segment.end, test.times[progress.done]) : segment.end;
-            differentiate_time_transformation(law.update, law.theta, candidate.beta, test.drive, segment,
+            differentiate_time_transformation(law.update, law.theta, candidate.beta, drive, segment,
                                               beginning.clock, due, work);
         }
         const double first = outputs ? smaller(1.0, clock.position(test.times[progress.done])) : 1.0;
@@ -110,6 +137,7 @@ private:
         const auto end = [&](Ending code, double place) {
             progress.code = code;
             progress.time = place > 0.0 ? clock.at(place).time : segment.start;
+            return progress.time;
         };
         while (s < 1.0) {
             h = bounded_step(s, h, settings.longest);
@@ -119,7 +147,7 @@ private:
                 if (code != STEP_TOO_SMALL && record.jacobian) steep_end(clock, s, near > 0 ? near : 0, steep);
                 return end(code, s);
             }
-            const double error = attempt(segment, clock, s, h, slope, first, before);
+            const double error = attempt(segment, drive, clock, s, h, slope, first, before);
             if (!(error <= 1.0)) {
                 h *= s == 0.0 && from_virgin ? first_step.factor(h, error) : step_factor(tableau, error, false);
                 growing = false;
@@ -141,6 +169,12 @@ private:
                 near = approaching_limit(candidate.limits, work, pace, TERMINATION_MARGIN);
                 steep = work.last_slope(near > 0 ? near : 0);
             }
+            const bool turns = drive.stiffness > 0.0 && drive.of_bar() &&
+                               left(segment, drive, clock, s, h, share) < -ROUNDING * drive.stiffness * work.new_value[0];
+            if (turns) {
+                share = turning(segment, drive, clock, s, h, share);
+                code = REACHED_END;
+            }
             fill(clock, s, h, share, progress);
             progress.reached = locate_levels(clock, tableau, work, s, h, share, record.arrivals, progress.reached);
             if (code != REACHED_END) {
@@ -148,6 +182,10 @@ private:
                     log_time_sensitivity(clock, tableau, work, s, h, share, ended, record.arrivals.end_change);
                 }
                 return end(code, s + share * h);
+            }
+            if (turns) {
+                stop(clock, s, h, share);
+                return progress.time = clock.at(s + share * h).time;
             }
             accept();
             slope = work.last_slope(0);
@@ -158,24 +196,24 @@ private:
             h *= longer;
             growing = true;
         }
-        progress.time = segment.end;
+        return progress.time = segment.end;
     }
 
     // Try a step; return its error over what is allowed, infinite when a stage has no solution.
-    double attempt(const Segment& segment, const SegmentClock& clock, double s, double h, double slope,
-                   double first, const AcceptedStep& before) const {
+    double attempt(const Segment& segment, const StressControl& drive, const SegmentClock& clock, double s, double h,
+                   double slope, double first, const AcceptedStep& before) const {
         // Under prescribed strain the stress counts as well: there Newton's tolerance alone decides.
-        const double negligible = test.drive.stiffness > 0.0 ? 0.0 : work.value[0] + settings.smallest;
+        const double negligible = drive.stiffness > 0.0 ? 0.0 : work.value[0] + settings.smallest;
         const StepStart start = {slope, before.length, newton_tolerance(settings),
                                  NEGLIGIBLE_STAGE_ERROR * smaller(LOOSEST_STAGES, settings.rtol) * negligible};
-        if (advance(candidate.law, test.drive, segment, clock, tableau, predictor, work, s, h, start) != SOLVED) {
+        if (advance(candidate.law, drive, segment, clock, tableau, predictor, work, s, h, start) != SOLVED) {
             return INFINITY;
         }
         const double ahead = larger(1.0, first / (s + h));
         const double caution = s == 0.0 && clock.transformation.tau == 0.0 ? INITIAL_ERROR_FACTOR : 1.0;
-        double error = caution * strain_error(tableau, test.drive, segment, work, settings, h, ahead, slope);
+        double error = caution * strain_error(tableau, drive, segment, work, settings, h, ahead, slope);
         if (error <= 1.0 && record.jacobian) {
-            if (differentiate(candidate.law, test.drive, segment, clock, tableau, work, s, h) != SOLVED) {
+            if (differentiate(candidate.law, drive, segment, clock, tableau, work, s, h) != SOLVED) {
                 return INFINITY;
             }
             error = larger(error, caution * sensitivity_error(tableau, work, settings, h, ahead));
@@ -189,6 +227,34 @@ private:
         for (int64_t k = 0; k < work.stages * work.unknowns(); ++k) work.past_slopes[k] = work.slopes[k];
         if (!record.jacobian) return;
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = work.new_change[k];
+    }
+
+    // What is left of a bar's stress at the share x of the step, MPa, below zero where it has another sign.
+    double left(const Segment& segment, const StressControl& drive, const SegmentClock& clock, double s, double h,
+                double x) const {
+        return segment.stress_at(clock.at(s + x * h).time) - drive.stiffness * work.dense(tableau, h, 0).at(x);
+    }
+
+    // The share of the step, `high` at most, at which nothing is left of it.
+    double turning(const Segment& segment, const StressControl& drive, const SegmentClock& clock, double s, double h,
+                   double high) const {
+        constexpr int BISECTIONS = 60;
+        double low = 0.0;
+        for (int k = 0; k < BISECTIONS; ++k) {
+            const double middle = 0.5 * (low + high);
+            (left(segment, drive, clock, s, h, middle) < 0.0 ? high : low) = middle;
+        }
+        return high;
+    }
+
+    // Make the share x of the step the start of what follows.
+    void stop(const SegmentClock& clock, double s, double h, double x) const {
+        for (int64_t v = 0; v < work.unknowns(); ++v) {
+            work.new_value[v] = work.dense(tableau, h, v).at(x);
+            if (!record.jacobian) continue;
+            dense_sensitivity(clock, tableau, work, s, h, x, v, work.new_change + v * work.parameters);
+        }
+        accept();
     }
 
     // A step that shrinks to nothing while the rate would burst the point at once: the rate diverges.
@@ -213,12 +279,15 @@ private:
             double x = (clock.position(test.times[progress.done]) - s) / h;
             if (x > share * (1.0 + 1e-10)) break;
             x = x < 0.0 ? 0.0 : x > 1.0 ? 1.0 : x;
-            record.strain[progress.done] = strain.at(x);
+            record.strain[progress.done] = work.offset + work.sign * strain.at(x);
+            if (record.path) record.path[progress.done] = strain.at(x);
             for (int64_t v = 1; record.values && v < work.unknowns(); ++v) {
                 record.values[progress.done * (work.unknowns() - 1) + v - 1] = work.dense(tableau, h, v).at(x);
             }
             if (record.jacobian) {
-                dense_sensitivity(clock, tableau, work, s, h, x, 0, record.jacobian + progress.done * work.parameters);
+                double* change = record.jacobian + progress.done * work.parameters;
+                dense_sensitivity(clock, tableau, work, s, h, x, 0, change);
+                for (int64_t p = 0; p < work.parameters; ++p) change[p] = work.offset_change[p] + work.sign * change[p];
             }
         }
     }

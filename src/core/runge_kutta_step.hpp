@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "comparison.hpp"
 #include "stage_problem.hpp"
 #include "stage_solver.hpp"
 #include "tableaux.hpp"
@@ -21,6 +22,16 @@ namespace creepkit {
 struct StressControl {
     double stiffness, load;
     Axes axes;
+
+    // Whether it is of a bar, whose stress has a sign.
+    bool of_bar() const {
+        return axes.principal == 0.0 && axes.mean == 0.0 &&
+               (axes.mean_slope == UNIAXIAL.mean_slope ? axes.principal_slope == 1.0
+                                                       : axes.mean_slope == COMPRESSION.mean_slope);
+    }
+
+    // The same of the size of a stress that has a sign: p shortens what is pressed.
+    StressControl along(double sign) const { return sign < 0.0 ? StressControl{stiffness, -load, COMPRESSION} : *this; }
 };
 
 // A stretch of the load program: start and end, s; driving stress, MPa, and temperature, K, straight lines in time.
@@ -36,6 +47,26 @@ struct Segment {
           end_stress(row[3]),
           stress_rate((row[3] - row[2]) / (row[1] - row[0])),
           temperature_rate((row[5] - row[4]) / (row[1] - row[0])) {}
+
+    double stress_at(double time) const { return stress + stress_rate * (time - start); }
+
+    // What is left of it from a time on.
+    Segment from(double time) const {
+        Segment rest = *this;
+        rest.start = time;
+        rest.stress = stress_at(time);
+        rest.temperature = temperature + temperature_rate * (time - start);
+        return rest;
+    }
+
+    // With factor (driving stress - shift) in the place of the driving stress.
+    Segment directed(double factor, double shift) const {
+        Segment turned = *this;
+        turned.stress = factor * (stress - shift);
+        turned.end_stress = factor * (end_stress - shift);
+        turned.stress_rate = factor * stress_rate;
+        return turned;
+    }
 };
 
 // The law's update and sensitivity entries, and one candidate's internal parameters (P,).
@@ -46,6 +77,8 @@ struct LawCall {
 
 // Working arrays of one point.
 //
+// sign, offset, offset_change : direction of the stress of a bar, whose axial creep strain is offset + sign p; (P,) its
+//     derivatives to the parameters
 // value, change         : (V,), (V, P) at the start of the step, and derivatives to the parameters
 // new_value, new_change : at its end
 // slopes, slope_changes : (stages, V), (stages, V, P) d/ds at the stages
@@ -60,7 +93,8 @@ struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
     double *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
-    double *clock_change, *nudged, *nudged_value;
+    double *clock_change, *nudged, *nudged_value, *offset_change;
+    double sign = 1.0, offset = 0.0;
     TimeAndPace* times;
     StageProblem* problems;
 
@@ -86,6 +120,7 @@ struct StepWorkspace {
         clock_change = memory.doubles(2 * parameters);
         nudged = memory.doubles(parameters);
         nudged_value = memory.doubles(size);
+        offset_change = memory.doubles(parameters);
         problems = memory.array<StageProblem>(stages);
     }
 
@@ -110,7 +145,8 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     }
     const TimeAndPace now = clock.at(s + tableau.c[i] * h);
     const double elapsed = now.time - segment.start, strain = base[0] > 0.0 ? base[0] : 0.0;
-    const double driving = segment.stress + segment.stress_rate * elapsed - drive.stiffness * strain;
+    const double left = segment.stress + segment.stress_rate * elapsed - drive.stiffness * strain;
+    const double driving = drive.of_bar() ? larger(0.0, left) : left;  // below zero by rounding, or about to turn
     work.times[i] = now;
     work.row[TIME] = now.time;
     work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * elapsed;
@@ -182,6 +218,7 @@ inline void chain_stage_response(const StressControl& drive, const Segment& segm
     const double trial_by_strain = drive.load * problem.trial - drive.stiffness * growth;
     const double trial_by_time = segment.stress_rate * growth, share = tableau.diagonal(i) * h;
     const double seen = work.base[i * size] >= 0.0 ? 1.0 : 0.0;  // whether the law saw the history of strain
+    const double trial_by_offset = fabs(drive.load) * problem.trial - work.sign * drive.stiffness;
     for (int64_t v = 0; v < size; ++v) {
         const double *answer = work.response + v * columns, *by_parameter = answer + INPUTS + work.states;
         double* result = work.slope_changes + (i * size + v) * count;
@@ -193,6 +230,7 @@ inline void chain_stage_response(const StressControl& drive, const Segment& segm
         for (int64_t p = 0; p < count; ++p) {
             double total = by_parameter[p] + by_strain * work.base_change[p];
             total += by_beta * work.clock_change[p] + by_tau * work.clock_change[count + p];
+            if (work.offset != 0.0) total += answer[BY_TRIAL] * trial_by_offset * work.offset_change[p];
             for (int64_t z = 1; z < size; ++z) total += answer[INPUTS + z - 1] * work.base_change[z * count + p];
             if (v > 0) total -= work.base_change[v * count + p];
             result[p] = total / share;

@@ -6,8 +6,8 @@
 //     sigma = (trial - k D) exp(load D)
 //
 // with w the weight of the stage in s, p0 and z0 the history, trial the stress in MPa without further creep, and k = 3G
-// in a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant load,
-// else 0. The unknown of the iteration is x = ln[D / (1 - k D/trial)]: every x is an increment that leaves some stress.
+// in a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant load, -1
+// compression, else 0. The unknown of the iteration is x = ln[D / (1 - k D/trial)]: every x is an increment that leaves some stress.
 //
 // The derivatives of (D, z) follow from the implicit function theorem; the finite element solver takes its consistent
 // tangent from them, the integration of a point its sensitivities to the parameters.
@@ -38,7 +38,12 @@ struct Axes {
 // Uniaxial tension: the largest principal stress is the stress, the mean stress a third of it.
 constexpr Axes UNIAXIAL = {0.0, 1.0, 0.0, 1.0 / 3.0};
 
-// What a stage is solved for: trial stress and k in MPa, load 0 or 1, weight w in s, strain p0 so far.
+// Uniaxial compression: no principal stress is above zero.
+constexpr Axes COMPRESSION = {0.0, 0.0, 0.0, -1.0 / 3.0};
+
+inline const Axes& axes_of(double sign) { return sign < 0.0 ? COMPRESSION : UNIAXIAL; }
+
+// What a stage is solved for: trial stress and k in MPa, load 0, 1 or -1, weight w in s, strain p0 so far.
 struct StageProblem {
     double trial, stiffness, load, weight, strain;
 };
@@ -56,7 +61,7 @@ inline StageIterate increment_and_stress(const StageProblem& problem, double x) 
         return {amount * elastic, x - log1p(ratio), problem.trial * elastic, elastic, elastic - 1.0};
     }
     const double stress =
-        problem.load > 0.0 ? problem.trial * exp(problem.load * (amount < 700.0 ? amount : 700.0)) : problem.trial;
+        problem.load != 0.0 ? problem.trial * exp(problem.load * (amount < 700.0 ? amount : 700.0)) : problem.trial;
     return {amount, x, stress, 1.0, problem.load * amount};
 }
 

@@ -96,12 +96,12 @@ inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta
         if (!(relaxes ? 1e-280 < share && share < 0.9999 : 1e-280 < increment && increment < 1e3)) break;
         const double elastic = 1.0 - share;
         double stress = problem.trial * elastic;
-        if (problem.load > 0.0) stress *= exp(problem.load * increment);
+        if (problem.load != 0.0) stress *= exp(problem.load * increment);
         write_point(row, axes, stress, problem.strain + increment);
         update(1, row, theta, out);
         if (!(out[0] >= NO_RATE)) break;
         const double residual = log(increment / problem.weight) - out[0];
-        const double stress_slope = problem.load > 0.0 ? problem.load * increment : -share;
+        const double stress_slope = problem.load != 0.0 ? problem.load * increment : -share;
         const double by_strain = increment * elastic * out[1 + STRAIN];
         const double by_stress = stress * stress_slope * stress_derivative(out, 1, axes);
         const double slope = elastic - by_strain - by_stress, step = -residual / slope;
@@ -118,7 +118,7 @@ inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta
         }
         if (enough) {
             stress = problem.trial * (1.0 - share);
-            if (problem.load > 0.0) stress *= exp(problem.load * increment);
+            if (problem.load != 0.0) stress *= exp(problem.load * increment);
             write_point(row, axes, stress, problem.strain + increment);
             return {increment, SOLVED};
         }

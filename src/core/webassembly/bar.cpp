@@ -29,7 +29,7 @@ CREEPKIT_PAGE_API int32_t creepkit_page_bar(int32_t states, double beta, const d
                                        int64_t(settings[5])};
     const Candidate candidate = {{page_law, nullptr, nullptr}, beta, {given.strain_limit, of_states, of_states + states}};
     const PointTest test = {{controls[0], controls[1], UNIAXIAL}, segment_count, time_count, segments, times};
-    const PointRecord record = {strain, values, nullptr, {}};
+    const PointRecord record = {strain, values, nullptr, {}, nullptr};
     const SlopePredictor predictor(method);
     const IntegrationProgress progress = PointIntegration{candidate, test, record, given, method, predictor, work}.run();
     ended[0] = double(progress.code);

@@ -34,7 +34,10 @@ from creepkit.records import Program
 
 @dataclass(frozen=True, eq=False)
 class PointTest:
-    """What a material point goes through: sigma = (driving - stiffness p) exp(p) under load, else without exp(p).
+    """What a material point goes through: sigma = (driving - stiffness c) exp(c) under load, else without exp(c).
+
+    c is the creep strain, of a bar along its axis: its equivalent creep strain p grows by the size of the stress, and c
+    by p in tension, by -p in compression.
 
     driving : MPa; stress, nominal stress under constant load, or E times the total strain in relaxation.
     temperature : K. times : (times,) s, non-decreasing. stiffness : MPa; 0 unless the strain is prescribed.
@@ -61,7 +64,7 @@ class PointTest:
     @cached_property
     def segments(self) -> Floats:
         """The programs merged, (segments, 6); kept, for a fit asks for them a thousand times."""
-        return merge_programs(self.driving, self.temperature, end=self.end)
+        return merge_programs(_with_zeros(self.driving), self.temperature, end=self.end)
 
     @property
     def end(self) -> float:
@@ -73,7 +76,8 @@ class PointTest:
 class Integration:
     """Strain of candidates x tests; the tests lie one behind another along the last axis of `strain`.
 
-    strain : (candidates, frames), NaN after an end; starts : (tests + 1,) where each test's frames begin.
+    strain : (candidates, frames), of a bar along its axis, NaN after an end; starts : (tests + 1,) where each test's
+        frames begin. path : (candidates, frames) equivalent creep strain; None unless states were to be kept.
     jacobian : (candidates, frames, P) or None, derivatives to the internal parameters.
     terminations : (candidates, tests) codes, see REASONS.
     end_times : (candidates, tests) s.
@@ -97,6 +101,7 @@ class Integration:
     level_rates: Floats
     level_time_jacobian: Floats | None
     states: Floats | None = None
+    path: Floats | None = None
 
     @property
     def status(self) -> Ints:
@@ -130,6 +135,7 @@ def integrate(
     result, inputs = _unfilled(theta, tests, jacobian), _inputs(law, theta, tests)
     if keep_states:
         result["values"] = np.full((*result["strain"].shape, law.states), np.nan)
+        result["path"] = np.full_like(result["strain"], np.nan)
     batch = BatchStructure(
         update=law.update.address,
         sensitivity=law.sensitivity.address,
@@ -163,6 +169,7 @@ def integrate(
         level_rates=result["arrival_slopes"],
         level_time_jacobian=result["arrival_jacobian"] if jacobian else None,
         states=result.get("values"),
+        path=result.get("path"),
     )
 
 
@@ -198,13 +205,24 @@ def _of_one_test(arrays: dict[str, Any], candidate: int, test: int) -> dict[str,
     Offsets count from the beginning of the segments, times and levels of all tests, as in the call of all.
     """
     by_test = ("theta", "beta", "endings", "end_times", "steps", "end_jacobian")
-    by_candidate = ("strain", "values", "jacobian", "arrivals", "arrival_slopes", "arrival_jacobian")
+    by_candidate = ("strain", "path", "values", "jacobian", "arrivals", "arrival_slopes", "arrival_jacobian")
     of_tests = ("stress_controls", "segment_offsets", "time_offsets", "level_offsets")
     return {
         **{name: arrays[name][candidate, test:] for name in by_test if len(arrays[name])},
         **{name: arrays[name][candidate] for name in by_candidate if name in arrays and len(arrays[name])},
         **{name: arrays[name][test:] for name in of_tests},
     }
+
+
+def _with_zeros(program: Program) -> Program:
+    """The program with a breakpoint wherever it passes zero between two others: a segment's stress has one sign."""
+    times, values = program.times, program.values
+    crossed = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (times[1:] > times[:-1]))
+    if not crossed.size:
+        return program
+    share = values[crossed] / (values[crossed] - values[crossed + 1])
+    zeros = times[crossed] + share * (times[crossed + 1] - times[crossed])
+    return Program(np.insert(times, crossed + 1, zeros), np.insert(values, crossed + 1, 0.0))
 
 
 def _offsets(sizes: list[int]) -> Ints:

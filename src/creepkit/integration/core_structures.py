@@ -112,7 +112,7 @@ class BatchStructure(ctypes.Structure):
         ("tableau", TableauStructure),
         *(
             (name, _POINTER)
-            for name in ("strain", "values", "jacobian", "endings", "end_times", "steps", "end_jacobian")
+            for name in ("strain", "path", "values", "jacobian", "endings", "end_times", "steps", "end_jacobian")
         ),
         *((name, _POINTER) for name in ("arrivals", "arrival_slopes", "arrival_jacobian")),
     ]

@@ -153,7 +153,7 @@ def tested_points(fit: Identification) -> Floats:
         times = history.used_times
         temperatures = history.temperature_program().at(times)
         if history.loading.quantity == "stress" and not isinstance(history.loading, PointLoading):
-            loads = history.loading.program().at(times)
+            loads = np.abs(history.loading.program().at(times))
             held = loads >= (1.0 - SAME_STRESS) * stresses.min(initial=np.inf)  # not those of a ramp that loaded it
             pairs.append(np.column_stack([loads, temperatures])[held])
         else:

@@ -11,7 +11,7 @@ from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.observation_vector import SINGLE_VALUES, SMALLEST_NOISE, ObservationVector
-from creepkit.inverse.reference_conditions import frame_noise, usable_frames
+from creepkit.inverse.reference_conditions import frame_noise, is_reversed, usable_frames
 from creepkit.records import History
 
 FREEDOM_PER_FRAME = 0.2
@@ -100,7 +100,7 @@ def _estimated_noise(history: History, name: str, values: Floats) -> Floats:
     usable = usable_frames(history, name)
     measured = history.outputs[name][usable]
     constant = np.full(values.shape, frame_noise(history, name))
-    if measured.size < 2 * FEWEST_HALF_FRAMES or measured.min() <= 0.0:
+    if measured.size < 2 * FEWEST_HALF_FRAMES or measured.min() <= 0.0 or is_reversed(history):
         return constant
     first, second = np.array_split(np.flatnonzero(usable), 2)
     noises, sizes = [], []

@@ -20,7 +20,7 @@ from creepkit.inverse.compared_tests import compares_minimum_rate, followed_dura
 from creepkit.inverse.composite_predictor import compared_outputs
 from creepkit.inverse.observation_series import SharedNoise
 from creepkit.inverse.output_transforms import LinearTransform, LogTransform, OutputTransform, SingleValueTransform
-from creepkit.inverse.reference_conditions import frame_noise, noise_standard_deviation, usable_frames
+from creepkit.inverse.reference_conditions import frame_noise, is_reversed, noise_standard_deviation, usable_frames
 from creepkit.quality.curve_shapes import runs_away
 from creepkit.records import History, Prediction, Predictor, is_logarithmic
 from creepkit.records.history import correlation_matrix
@@ -53,7 +53,7 @@ def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
         return SingleValueTransform(1.0, float(np.log(max(h.minimum_rate or 0.0 for h in histories))) + 1.0)
     values = [h.outputs[output][usable_frames(h, output)] for h in histories]
     if is_logarithmic(output):
-        typical = float(np.median([np.max(one, initial=0.0) for one in values]))
+        typical = float(np.median([np.max(np.abs(one), initial=0.0) for one in values]))
         noise = float(np.median([frame_noise(h, output) for h in histories]))
         return LogTransform(max(FLOOR_SHARE * typical, FLOOR_NOISES * noise, 1e-14))
     joined = np.concatenate(values)
@@ -135,7 +135,7 @@ class ObservedOutput:
             history.outputs[name][frames],
             history.times[frames],
             noise_standard_deviation(full, name)[np.searchsorted(full.times, history.times)],
-            relative=sd is not None or not is_logarithmic(name),
+            relative=sd is not None or is_reversed(history) or not is_logarithmic(name),
             stated=sd is not None and bool((np.isfinite(sd) & (sd > 0))[usable].all()),
         )
 

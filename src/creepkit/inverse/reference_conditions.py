@@ -25,6 +25,12 @@ def usable_frames(history: History, output: str) -> Bools:
     return np.asarray(history.used & (history.times > 0) & np.isfinite(history.outputs[output]))
 
 
+def is_reversed(history: History) -> bool:
+    """Whether a load changes sign: the noise of a strain that turns is no share of it."""
+    values = history.loading.program().values
+    return bool(values.min() < 0.0 < values.max())
+
+
 @lru_cache(maxsize=4096)
 def frame_noise(history: History, output: str) -> float:
     """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames."""
@@ -92,8 +98,8 @@ def distinct_loads(histories: Sequence[History]) -> list[float]:
     for history in histories:
         program = history.loading.program()
         for load in np.interp(history.times[history.used], program.times, program.values):
-            if load > 0 and not any(abs(load - level) <= HELD_LOAD * level for level in loads):
-                loads.append(float(load))
+            if load != 0 and not any(abs(abs(load) - level) <= HELD_LOAD * level for level in loads):
+                loads.append(abs(float(load)))
     return loads
 
 
@@ -120,7 +126,7 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
             f"{history.origin}: nothing says which stress a {history.loading.quantity} makes in the specimen "
             f"'{history.specimen}', and searches begin at a stress; give it a method reference_stress(history), MPa"
         )
-    return history.load_levels
+    return np.abs(history.load_levels)
 
 
 def simulated_stresses(
@@ -171,7 +177,7 @@ def reference_end_strain(history: History, predictor: Predictor | None = None) -
         return max(float(stated), 1e-7)
     output = growing_output(history)
     if is_logarithmic(output):
-        return max(float(np.max(history.outputs[output][usable_frames(history, output)], initial=0.0)), 1e-7)
+        return max(float(np.max(np.abs(history.outputs[output][usable_frames(history, output)]), initial=0.0)), 1e-7)
     return max(_output_increase(history)[0] / growth_per_strain(history, predictor), 1e-7)
 
 

@@ -126,7 +126,15 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     used, elastic = _used_frames(conditions, frames), elastic_stated(conditions, frames, loading)
-    if "strain" in outputs and loading.quantity == "stress" and _is_compression(conditions, name):
+    signed = loading.quantity == "stress" and bool((loading.program().values < 0.0).any())
+    if signed and not outputs:
+        raise HistoryError(
+            f"{conditions.location_of('stress')}: a test without a curve at {loading.program().values.min():g} MPa; "
+            "a rupture time or a minimum rate is that of tension: write the size of the stress"
+        )
+    if signed and "strain" in outputs and not (loading.program().values > 0.0).any():
+        outputs["strain"] = _as_shortening(conditions, outputs["strain"])
+    if "strain" in outputs and loading.quantity == "stress" and not signed and _is_compression(conditions, name):
         loading, outputs["strain"] = _as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
@@ -544,6 +552,14 @@ def _take_height(conditions: StatedConditions, name: str) -> None:
     if {"height", "gauge_length"} & conditions.geometry.keys() == {"height"} and _is_compression(conditions, name):
         height = conditions.geometry["gauge_length"] = conditions.geometry.pop("height")
         conditions.record_assumption(f"the height {height:g} mm is the gauge length")
+
+
+def _as_shortening(conditions: StatedConditions, strain: Floats) -> Floats:
+    """Strain (frames,) - under a stress that is stated as negative, below zero as well."""
+    if strain[np.isfinite(strain)].sum() <= 0.0:
+        return strain
+    conditions.record_assumption("shortening is a negative strain, as its stress is negative", first=True)
+    return -strain
 
 
 def _as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:

@@ -120,6 +120,7 @@ def held_otherwise(loading: Loading) -> tuple[Loading, Literal["load", "stress"]
 class StressSteps:
     """Uniaxial loading by steps of stress: [(0, 100), (3600, 120)] is 100 MPa, then 120 MPa from one hour on.
 
+    steps : (time in s, MPa), tension above zero and compression below.
     control : "load" when the load is constant in each step (stress is engineering stress and true stress grows as
         exp(strain)); "stress" when true stress is held.
     """
@@ -130,8 +131,8 @@ class StressSteps:
 
     def __post_init__(self) -> None:
         steps = _checked_steps("stress steps", self.steps)
-        if any(not 0 <= s < 1e5 for _, s in steps):
-            raise SolveError(f"stress must lie from 0 to 1e5 MPa in every step, found {[s for _, s in steps]}")
+        if any(not abs(s) < 1e5 for _, s in steps):
+            raise SolveError(f"stress must lie from -1e5 to 1e5 MPa in every step, found {[s for _, s in steps]}")
         object.__setattr__(self, "steps", steps)
 
     def program(self) -> Program:
@@ -153,7 +154,8 @@ def constant_stress(stress: float, control: Literal["load", "stress"] = "load") 
 class StrainSteps:
     """Total strain of a bar by steps: [(0, 0.002), (3600, 0.003)] holds 0.2 %, then 0.3 % from one hour on.
 
-    steps : (time in s, total strain). ramp : s, in which each strain is reached; 0 is at once.
+    steps : (time in s, total strain), below zero where the bar is shortened.
+    ramp : s, in which each strain is reached; 0 is at once.
     """
 
     steps: tuple[tuple[float, float], ...]
@@ -162,8 +164,8 @@ class StrainSteps:
 
     def __post_init__(self) -> None:
         steps = _checked_steps("strain steps", self.steps)
-        if any(not 0 <= e <= 1 for _, e in steps):
-            raise SolveError(f"total strain must lie from 0 to 1 in every step, found {[e for _, e in steps]}")
+        if any(not -0.99 <= e <= 1 for _, e in steps):
+            raise SolveError(f"total strain must lie from -0.99 to 1 in every step, found {[e for _, e in steps]}")
         _check_ramp(self.ramp, steps)
         object.__setattr__(self, "steps", steps)
 

@@ -23,24 +23,13 @@ from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
+from creepkit.reports import words
 from creepkit.reports.blocks import MOST_NAMED, Answer, Cell, Rich, Table, as_text, listed, number, plural, printable
 from creepkit.reports.cautions import cautions
 from creepkit.reports.description import headline_role, mean_misfit_text, tested_range, tests_text
 from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 from creepkit.reports.verdicts import same_functions, verdict_text
-from creepkit.reports.words import (
-    BRACKETS,
-    CODES,
-    CONSTANT_LOAD,
-    DESIGN,
-    FORECAST,
-    MEAN_SLOPE,
-    MORE_CODES,
-    NEW_TEST,
-    OTHER_N,
-    OVER_ALL_TESTS,
-)
 
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
@@ -132,7 +121,7 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     slopes = ([math.nan] * 3 if not rates else exponents(rates, energy=energy) for energy in (False, True))
     (measured, half, predicted), (heat, error, _) = slopes
     of_heat = (heat, heat - error, heat + error)
-    where = f"{OVER_ALL_TESTS}, {tested_range(fit)}"
+    where = f"{words.OVER_ALL_TESTS}, {tested_range(fit)}"
     by_rates = _with_interval("activation energy", where, of_heat, 1e-3, "kJ/mol")
     if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
@@ -145,10 +134,10 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
-    by_tests = MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
+    by_tests = words.MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
-        by_tests = MEAN_SLOPE.format(value=by_rates.text) if math.isfinite(heat) else ""
+        by_tests = words.MEAN_SLOPE.format(value=by_rates.text) if math.isfinite(heat) else ""
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
@@ -164,7 +153,7 @@ def _lives(fit: Identification) -> list[KeyFigure]:
     end, test = max(broken, key=lambda pair: pair[0].measured)
     said = f"measured {_written_out(end.measured / SECONDS_PER_HOUR, 3)} h"
     hours = [time / SECONDS_PER_HOUR for time in (end.predicted, end.low, end.high)]
-    where = NEW_TEST.format(condition=test.condition)
+    where = words.NEW_TEST.format(condition=test.condition)
     return [_with_interval("time to rupture", where, hours, unit="h", remark=said)]
 
 
@@ -197,13 +186,13 @@ def _shown(test: TestForecast, *, times: bool) -> Iterator[KeyFigure]:
     """times : to values are asked for."""
     condition = test.history.condition
     where, end = condition if test.name in condition else f"{test.name}: {condition}", float(test.history.times[-1])
-    where = where if test.inside is not None else NEW_TEST.format(condition=where)
+    where = where if test.inside is not None else words.NEW_TEST.format(condition=where)
     reached = [one for one in test.times if math.isfinite(one.median)]
     life = [one for one in reached if not one.output and (one.median <= end or (times and len(test.times) == 1))]
     wanted = [*([one for one in reached if one.output] if times else ()), *life]
     for figure, one in [(time_figure(one), one) for one in wanted] or [(one, None) for one in end_figures(test)][:1]:
         beyond = test.extrapolated_in(one)
-        said = [FORECAST["beyond"].format(quantities=listed(beyond))] * bool(beyond)
+        said = [words.FORECAST["beyond"].format(quantities=listed(beyond))] * bool(beyond)
         yield replace(figure, where=where, remark=", ".join(filter(None, [figure.remark, *said])))
 
 
@@ -212,7 +201,7 @@ def time_figure(one: TimeForecast) -> KeyFigure:
     inside = {True: "inside", False: "outside", None: ""}[one.inside]
     said = [f"measured {'> ' * one.censored}{hours_number(one.measured)} h, {inside}"] * math.isfinite(one.measured)
     if math.isfinite(one.value) and abs(one.value - one.median) > OTHER_MEDIAN * one.median:
-        said.append(FORECAST["by values"].format(hours=_written_out(one.value / SECONDS_PER_HOUR, 3)))
+        said.append(words.FORECAST["by values"].format(hours=_written_out(one.value / SECONDS_PER_HOUR, 3)))
     hours = (one.median, one.low, one.high)
     return _with_interval(f"time to {event_text(one)}", "", hours, 1 / SECONDS_PER_HOUR, "h", "; ".join(said))
 
@@ -228,11 +217,16 @@ def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
             yield _with_interval(label, test.history.condition, values, factor, unit)
 
 
+MOST_STRENGTHS = 3
+"""Temperatures whose strengths are named first."""
+
+
 def _longest_strengths(assessment: RuptureAssessment) -> list[StrengthEstimate]:
-    """The mean of the methods at the longest time at which one is known, a temperature each."""
+    """The mean of the methods at the longest time at which one is known, at the outer temperatures and one between."""
     found = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
     hours = max((one.hours for one in found), default=0.0)
-    return [one for one in found if one.hours == hours]
+    found = [one for one in found if one.hours == hours]
+    return [found[k] for k in dict.fromkeys(round(k) for k in np.linspace(0, len(found) - 1, MOST_STRENGTHS)) if found]
 
 
 def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
@@ -245,18 +239,13 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
     return [*lives, *(_of_mean("rupture strength", f"{one.hours:g} h", one.value, "MPa", one) for one in strengths)]
 
 
-MOST_STRENGTHS = 3
-"""Temperatures that the line of strengths names: the outer ones, and one between them."""
-
-
 def strengths_line(assessment: RuptureAssessment) -> str:
     """The strengths at the longest time in one line, with the intervals of their means; "" where none is known."""
     found = _longest_strengths(assessment)
     if not found:
         return ""
-    places = dict.fromkeys(round(k) for k in np.linspace(0, len(found) - 1, MOST_STRENGTHS))
-    shown = (_of_mean("", "", found[k].value, "MPa", found[k]) for k in places)
-    at = [f"{celsius_text(found[k].temperature, digits=0)} {one.text}" for k, one in zip(places, shown, strict=True)]
+    shown = [(one, _of_mean("", "", one.value, "MPa", one).text) for one in found]
+    at = [f"{celsius_text(one.temperature, digits=0)} {text}" for one, text in shown]
     return f"rupture strength, {found[0].hours:g} h: {', '.join(at)}"
 
 
@@ -298,8 +287,9 @@ def answer(
     remarks += [fit.sparsity.verdict] if fit.sparsity is not None else []
     figures, n = key_figures(fit), fit.values.get("n", math.nan)
     exponent = next((one.value for one in figures if one.name == "stress exponent"), math.nan)
-    other = OTHER_N * (abs(n - exponent) > OTHER_EXPONENT * exponent)
+    other = words.OTHER_N * (abs(n - exponent) > OTHER_EXPONENT * exponent)
     figures = [*asked[:MOST_ASKED], *figures]
+    planned = design.sentence.removeprefix(words.DESIGN["test"].partition("{")[0]) if design is not None else ""
     return Answer(
         fit.headline,
         "; ".join(filter(None, (tests_text(fit), mean_misfit_text(fit)))),
@@ -308,24 +298,19 @@ def answer(
         [(symbols[e.name], *_shown_value(fit.law, e), unit_text(e.unit)) for e in fit.estimates],
         [(one.name, one.where, one.text, one.remark) for one in figures],
         cautions(fit, ranking, quality)[:MOST_CAUTIONS],
-        next_step(fit, ranking, searched) if design is None or not design.plan else planned_text(design),
+        next_step(fit, ranking, searched) if design is None or not design.plan else planned,
         remarks,
-        brackets=BRACKETS * any("[" in one.text for one in figures),
+        brackets=words.BRACKETS * any("[" in one.text for one in figures),
         role=headline_role(fit),
         units=f"{Answer.units}{other}",
         **page,
     )
 
 
-def planned_text(design: Design) -> str:
-    """The tests of a design as what to do next."""
-    return design.sentence.removeprefix(DESIGN["test"].partition("{")[0])
-
-
 def codes_text(fit: Identification) -> str:
     """The law's keyword, or the routine that it needs, in finite element codes; "" where none takes it."""
     found = [f"{program}: {line}" for program, line in input_of_programs(fit).items()]
-    return f"{CODES.format(codes='; '.join(found))} ({MORE_CODES})" if found else ""
+    return words.CODES.format(codes="; ".join(found)) if found else ""
 
 
 def answer_text(fit: Identification, ranking: Ranking | None = None, more: object = ".details()", **known: Any) -> str:
@@ -345,7 +330,8 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
     for name, (fit, decisive) in groups.items():
         figures = {one.name: one.text for one in key_figures(fit)}
         choice = {None: "", True: ", decisive", False: ", not decisive"}[decisive]
-        rate, stress = figures.get("creep rate", "–").replace(" %/h", ""), number(fit.tested_point.stress, 3)
+        rate = figures.get("creep rate", "–").replace(" %/h", "")
+        stress = "–" if rate == "–" else number(fit.tested_point.stress, 3)
         numbers = (figures.get("stress exponent", "–"), rate, stress)
         rows.append((name, titled_law(fit.law), *numbers, f"{verdict_text(fit.adequacy)}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
@@ -491,4 +477,4 @@ def constant_load_sentence(fit: Identification) -> str:
     if not any(held_of(h.loading) == "load" for h in of_stress):
         return ""
     growth = f"{100 * fit.ranges['strain'][1]:.2g} %"
-    return CONSTANT_LOAD.format(growth=growth)
+    return words.CONSTANT_LOAD.format(growth=growth)

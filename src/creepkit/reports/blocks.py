@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
-from creepkit.reports.words import ALL_DIGITS
+from creepkit.reports.words import ALL_DIGITS, OVER_ALL_TESTS
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -66,7 +66,7 @@ class Items:
     title: str = ""
 
 
-_NUMBERS = re.compile(r"([-+>\d.,%\[\]– ]|\de[-+]\d|to|inf|none|\+-|\(search bound\))*")
+_NUMBERS = re.compile(r"([-−+>\d.,%\[\]–×⁻⁰¹²³⁴⁵⁶⁷⁸⁹∞\s]|\de[-+]\d|to|inf|none|\+-|\(search bound\))*")
 """A cell with numbers alone, with their intervals, or one that says that there is none."""
 
 
@@ -172,7 +172,7 @@ class Answer:
     picture: Any = None
     files: Sequence[tuple[str, str, str]] = ()
     more: str = ".details()"
-    units: str = "true stress over 1 MPa, time over 1 s, strain as a fraction"
+    units: str = "true stress/MPa, time/s, strain as a fraction"
     brackets: str = ""
     codes: str = ""
     role: str = ""
@@ -304,7 +304,13 @@ _UNIT = re.compile(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:°C|%|[GMk]?Pa|1
 """The space between a number and its unit."""
 
 
+MOST_WRITTEN_OUT = 5
+"""Power of ten up to which a number stands in full, such as 2930 and 100000 h."""
+
+
 def _with_power(found: re.Match[str]) -> str:
+    if 0 <= int(found[2]) <= MOST_WRITTEN_OUT:
+        return f"{float(found[0]):.0f}"
     power = str(int(found[2])).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"10{power}" if found[1] == "1" else f"{found[1]}\u00a0×\u00a010{power}"
 
@@ -354,7 +360,10 @@ def _answer_lines(answer: Answer) -> list[str]:
 
     So do mean misfits, and then the intervals of values, where they would leave no room for one figure and one remark.
     """
-    figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
+    figures = [
+        f"{name}{at and (' ' if at.startswith(OVER_ALL_TESTS) else ' at ')}{at}: {value}{note and ', '}{note}"
+        for name, at, value, note in answer.figures
+    ]
     end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
     tests, _, misfits = answer.tests.partition("; ")

@@ -15,7 +15,8 @@ from creepkit.reports.blocks import named, number
 from creepkit.reports.description import rejected
 from creepkit.reports.remarks import challenge_text, combined_change_text, nuisance_text, test_change_text
 from creepkit.reports.verdicts import cause_caution, cause_headline, unmet_text
-from creepkit.reports.words import CAUTIONS, IN_EACH_TEST, ONE_ALONE, REASONS
+from creepkit.reports.wording import say
+from creepkit.reports.words import CAUTIONS, REASONS
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy
@@ -152,10 +153,9 @@ def _precision(fit: Identification) -> Iterator[str]:
     if change := combined_change_text(fit.unmodelled):
         left_out = beyond_intervals(fit.unmodelled)
         kinds = " and ".join(dict.fromkeys(one.description for one in left_out[:2]))
-        kinds += IN_EACH_TEST * (left_out[0].tests > 1)
-        single = max((test_change_text(one) for one in left_out if one.tests > 1), default="")
-        alone = ONE_ALONE.format(change=single) if single else ""
-        yield CAUTIONS["not included"].format(kinds=kinds, change=change, alone=alone)
+        alone = max((test_change_text(one) for one in left_out if one.tests > 1), default="")
+        each = "each test" * (left_out[0].tests > 1)
+        yield say(CAUTIONS["not included"], kinds=kinds, each=each, change=change, alone=alone)
 
 
 def _data(quality: DataQuality | None) -> Iterator[str]:

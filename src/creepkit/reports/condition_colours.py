@@ -67,7 +67,9 @@ class ColourScale:
         norm = (LogNorm if self.logarithmic else Normalize)(low, high)
         colours = ListedColormap(colormaps[self.colour_map](np.linspace(*USED, 256)))
         bar = axes.figure.colorbar(ScalarMappable(norm, colours), ax=axes, label=self.label, pad=0.01, aspect=30)
-        ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
+        ticks = np.unique([float(f"{value:.3g}") for value in np.append(self.values, self.levels)])
+        if ticks.size > LABELS or ticks[0] < low or ticks[-1] > high:  # of few conditions those that were tested
+            ticks = (np.geomspace if self.logarithmic else np.linspace)(low, high, LABELS)
         bar.set_ticks(list(ticks), labels=[f"{float(f'{v:.3g}'):g}" for v in ticks])
         bar.ax.yaxis.set_minor_locator(NullLocator())
 

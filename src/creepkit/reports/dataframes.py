@@ -71,13 +71,8 @@ def _rows(record: Any) -> tuple[Any, str]:
 
 @_rows.register
 def _(history: History) -> tuple[Any, str]:
-    outputs = {_column(name): values for name, values in history.outputs.items()}
+    outputs = {f"{name}_{output_unit(name)}".rstrip("_"): values for name, values in history.outputs.items()}
     return {"time_s": history.times, **outputs, "used": history.used}, ""
-
-
-def _column(output: str) -> str:
-    """The name of an output with its unit, as files have it."""
-    return f"{output}_{output_unit(output)}" if output_unit(output) else output
 
 
 @_rows.register

@@ -179,10 +179,10 @@ def rejected(fit: Identification | TemperatureLaw) -> bool:
     return fit.adequacy is not None and fit.adequacy.rejects
 
 
-def tested_range(fit: Identification) -> str:
+def tested_range(*fits: Identification) -> str:
     """Stresses and temperatures of the tests, "80–200 MPa, 575–625 °C"."""
-    celsius = celsius_text(*fit.ranges["temperature"], digits=0)
-    return f"{ends(fit.ranges['stress'], 3)} MPa, {celsius}".replace(" to ", "–")
+    stresses, kelvin = ([end for fit in fits for end in fit.ranges[name]] for name in ("stress", "temperature"))
+    return f"{ends(stresses, 3)} MPa, {celsius_text(min(kelvin), max(kelvin), digits=0)}".replace(" to ", "–")
 
 
 def tests_text(fit: Identification) -> str:

@@ -86,15 +86,8 @@ def design_answer(design: Design, picture: Block | None = None) -> Answer:
     alike = {run.description: [one for one in runs if one.description == run.description] for run in runs}
     shown = [(plural(len(same), "run"), same[0]) for same in alike.values() if len(runs) > 1]
     shown += [("next best", test) for test in design.tests if test.description not in alike][:MOST_NEXT]
-    figures = [
-        (
-            f"{name}, {run.description}",
-            "",
-            _precision(design, run.expectation),
-            f"{_hours(run.hours)} h of machine time",
-        )
-        for name, run in shown
-    ]
+    told = [(_precision(design, run.expectation), f"{_hours(run.hours)} h of machine time") for _, run in shown]
+    figures = [(f"{name}, {run.description}", "", *said) for (name, run), said in zip(shown, told, strict=True)]
     obstacle = design.obstacle or "one law" * _is_hopeless(design)
     limit = next((reason for reason, _ in _refusals(design).most_common(1)), "none")
     return Answer(

@@ -15,7 +15,6 @@ from creepkit.records.presentable import function_of_reports
 
 SHOWN = {
     "AlloyResult": "alloy failure verdict decisive credible_laws equivalents laws",
-    "Band": "median low high lowest highest",
     "Channel": "name quantity reference written_unit missing",
     "CreepLaw": "name title fingerprint references constraints latex",
     "Design": "* sentence",
@@ -27,7 +26,6 @@ SHOWN = {
     "InstrumentRecord": "name source notes rows=times.size interval start gaps",
     "LawMisfit": "factor stress temperature log_factor",
     "Material": "name title form source law values ranges covariance",
-    "Param": "meaning unit bounds scale off limits",
     "PlannedTest": "description hours information_per_hour at_draws histories expectation",
     "Plugin": "name=provenance.name from=provenance.origin problem",
     "Ranking": "headline=best.headline verdict decisive adequacy further failed challenges laws",
@@ -38,7 +36,6 @@ SHOWN = {
     "RuptureFit": "method degree fixed log_likelihood scale scatter effects",
     "ScreeningResult": "alloys=results law_fractions failures notes",
     "Specimen": "name title outputs nuisances",
-    "State": "meaning unit initial limit rate",
     "StudyResult": "title stages exclusions report",
     "TemperatureLaw": "law=law.name criterion_data temperature_range T_ref forms plausible_forms candidates notes",
     "TestForecast": "name condition=history.condition outputs times includes extrapolation notes caution misfit inside",
@@ -75,10 +72,6 @@ def _history(one: Any) -> Mapping[str, Any]:
     }
 
 
-def _ends(values: Any) -> list[float]:
-    return [float(np.nanmin(values)), float(np.nanmax(values))]
-
-
 def _registered(one: Any) -> Mapping[str, Any]:
     """All of a law, specimen or material; name and title of others."""
     value, shown = one.value, {"provenance": str(one.provenance)}
@@ -89,7 +82,9 @@ def _registered(one: Any) -> Mapping[str, Any]:
 
 ALSO: dict[str, Callable[[Any], Mapping[str, Any]]] = {
     "Challenge": lambda one: {"sentence": function_of_reports("remarks.challenge_text")(one)},
-    "Channel": lambda one: {"ends": [] if one.missing == one.values.size else _ends(one.values)},
+    "Channel": lambda one: {
+        "ends": [float(end(one.values)) for end in (np.nanmin, np.nanmax) if one.missing < one.values.size]
+    },
     "CreepLaw": lambda law: {
         "terms": law.terms,
         "parameters": law.table,

@@ -22,6 +22,7 @@ from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.load_programs import kind_of_test
 from creepkit.reports.prediction_bands import axis_label
+from creepkit.reports.wording import say
 from creepkit.reports.words import FORECAST
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
 
 def _misfit_text(misfit: LawMisfit) -> str:
     factor, here = f"{math.exp(abs(misfit.log_factor)):.3g}", f"{misfit.factor:.3g}"
-    return FORECAST["misses"].format(factor=factor, allowed=FORECAST["allowed"].format(here=here) * (here != "1"))
+    return say(FORECAST["misses"], factor=factor, here=here * (here != "1"))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -194,10 +195,6 @@ BELOW_EDGE = 0.04
 """Of the height of a panel: how far below its upper edge the interval of the rupture time is drawn."""
 
 
-LONGEST_AXIS = 5.0
-"""Of the time of a test: beyond, an interval goes on to the right of the axis, as an arrow says."""
-
-
 SHOWN_RATIO = 1e-3
 """Of the largest strain: the lower end of a logarithmic axis."""
 
@@ -259,23 +256,14 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str)
     axes.plot(hours, curve, color="#1f3f73", lw=1.3, label="identified law")
     label = "measured" if measured.size else None
     axes.plot(measured_hours, measured, ".", ms=3, color="black", alpha=0.6, label=label)
-    start, end = float(hours[0]) if logarithmic else 0.0, _time_end(test)
+    start, end = float(hours[0]) if logarithmic else 0.0, float(hours[-1])
     span(axes, "x", start, end, logarithmic=logarithmic)
-    axes.set_xlim(0.95 * start, 1.03 * end)
+    axes.set_xlim(start, end)  # where the bands end, not beyond
     _draw_times(axes, test, one, level)
     axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
     axes.set_ylabel(axis_label(one.output), fontsize=8)
     axes.set_xlabel("time, h", fontsize=8)
     axes.tick_params(labelsize=7)
-
-
-def _time_end(test: TestForecast) -> float:
-    """h, the end of the time axis: that of the test, or of an interval that begins before it, up to LONGEST_AXIS."""
-    last = end = float(test.history.times[-1]) / SECONDS_PER_HOUR
-    for time in sorted((t for t in test.times if np.isfinite(t.low)), key=lambda t: t.low):
-        if time.low / SECONDS_PER_HOUR < end:
-            end = max(end, min(time.high / SECONDS_PER_HOUR, LONGEST_AXIS * last))
-    return end
 
 
 def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, Floats]:

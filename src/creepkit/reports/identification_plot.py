@@ -256,7 +256,8 @@ def small_multiples(fit: Identification, tests: Sequence[int]) -> Figure:
     cells = figure.add_gridspec(rows, columns)
     for place, (k, output) in enumerate(drawn):
         cell = cells[place // columns, place % columns].subgridspec(2, 1, height_ratios=(2.2, 1.0), hspace=0.04)
-        above, below = figure.add_subplot(cell[0]), figure.add_subplot(cell[1])
+        above = figure.add_subplot(cell[0])
+        below = figure.add_subplot(cell[1], sharex=above)
         curve = curve_of_test(fit, curves, k, output)
         draw_curve(above, curve, colours[k], dots="0.25")
         set_curve_ranges(above, [curve], output)
@@ -310,8 +311,6 @@ def _draw_residuals(axes: Axes, fit: Identification, curve: TestCurve, output: s
     axes.axhline(0, color="black", lw=0.8)
     span(axes, "y", -limit, limit)
     axes.set_ylim(-limit, limit)
-    if values.size:
-        set_time_range(axes, hours, output)
     plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else unit_of(output)
     axes.set_ylabel("noise sd" if judged else plain, fontsize=7)
 

@@ -15,6 +15,7 @@ from creepkit.records.units import celsius_text
 from creepkit.reports.blocks import named
 from creepkit.reports.description import rejected
 from creepkit.reports.verdicts import cause_next_step
+from creepkit.reports.wording import say
 from creepkit.reports.words import NEXT, TRY
 
 if TYPE_CHECKING:
@@ -28,8 +29,7 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     names, laws = named(weak, "parameter"), [] if ranking is None else [r.fit for r in ranking.laws]
     in_tests = None if adequacy is None else adequacy.in_tests
     if not fit.converged and not (adequacy is not None and adequacy.lies_in_tests):
-        bounds = f" and bounds for {names}" if weak else ""
-        return NEXT["search"].format(starts=2 * fit.settings.starts, bounds=bounds)
+        return say(NEXT["search"], starts=2 * fit.settings.starts, names=names * bool(weak))
     if in_tests is not None:
         return cause_next_step(in_tests)
     if adequacy is not None and adequacy.remedies:

@@ -265,8 +265,8 @@ MOST_LAWS = 10
 """Laws with a colour of their own."""
 
 
-WIDTH, ROW, LARGEST = 8.6, 0.115, 11.0
-"""Inches of the figure, of a material in it, and of its height at most."""
+WIDTH, PAGE_WIDTH, ROW, LARGEST = 8.6, 5.8, 0.115, 11.0
+"""Inches of the figure, of one on a page for telephones too, of a material in it, and of its height at most."""
 
 
 def plate_size(materials: int) -> tuple[float, float]:
@@ -276,19 +276,24 @@ def plate_size(materials: int) -> tuple[float, float]:
 
 def plate_figure(fits: Sequence[tuple[str, Identification]]) -> Figure:
     """The map of a plate alone, see draw_plate."""
-    figure, axes = panels_of(*plate_size(len(fits)))
+    figure, axes = panels_of(PAGE_WIDTH, plate_size(len(fits))[1])
     draw_plate(axes, fits)
     return figure
 
 
-def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
-    """Rates in %/h, 95 % intervals, at the median stress and strain of all; fits : (material, best law), in order."""
+def plate_rates(fits: Sequence[tuple[str, Identification]]) -> tuple[float, float, Floats]:
+    """The median stress, MPa, and strain of the materials, and their rates there, %/h, (materials, 3) with ends."""
     points = [fit.tested_point for _, fit in fits]
     stress, strain = (float(v) for v in np.median([(one.stress, one.strain) for one in points], axis=0))
+    rates = [[float(v) for v in fit.rate(stress, strain=strain, warn=False)] for _, fit in fits]
+    return stress, strain, PERCENT_PER_HOUR * np.array(rates)
+
+
+def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
+    """Rates in %/h, 95 % intervals, at the median stress and strain of all; fits : (material, best law), in order."""
+    stress, strain, rates = plate_rates(fits)
     laws = list(dict.fromkeys(fit.law.name for _, fit in fits))
     colours = dict(zip(laws, distinct_colours(len(laws)), strict=True))
-    rates = np.array([[float(v) for v in fit.rate(stress, strain=strain, warn=False)] for _, fit in fits])
-    rates = PERCENT_PER_HOUR * rates
     centre = rates[:, 0][np.isfinite(rates[:, 0]) & (rates[:, 0] > 0)]
     named: set[str] = set()
     for k, ((_, fit), (rate, low, high)) in enumerate(zip(fits, rates, strict=True)):
@@ -309,4 +314,4 @@ def draw_plate(axes: Axes, fits: Sequence[tuple[str, Identification]]) -> None:
     axes.set_yticks(range(len(fits)), [shortened(name, 24) for name, _ in fits], fontsize=7 if len(fits) > 20 else 8)
     axes.set_ylim(len(fits) - 0.5, -0.5)
     axes.set(xlabel=f"creep rate at {stress:.3g} MPa and {100 * strain:.2g} % strain, %/h")
-    place_legend(axes, "law; open:\nrejected\nby its tests")
+    place_legend(axes, below=True)

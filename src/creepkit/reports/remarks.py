@@ -123,7 +123,9 @@ def challenge_text(one: Challenge) -> str:
         kind = "remedy" if one.laws else "effect"
         return say(CHALLENGES[kind], one=one, sizes=sizes, effect=effect, own=own, weight=weight)
     if one.excess is None:
-        return say(CHALLENGES["unknown"], altered=say(CHALLENGES[f"unknown {one.kind}"], one=one))
+        return say(
+            CHALLENGES["unknown"], altered=say(CHALLENGES["unknown sum"], one=one) if one.kind == "sum" else one.subject
+        )
     side = "higher" if one.excess > 0 else "lower"
     kind = "better" if one.fits_better else "same" if abs(one.excess) < SMALLEST_SHOWN else side
     return say(CHALLENGES[kind], altered=say(CHALLENGES[one.kind], one=one), difference=abs(one.excess), side=side)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
 from creepkit.rupture_assessment.methods import METHODS, THERMAL, Conditions
 from creepkit.rupture_assessment.rupture_fit import power_of_ten
-from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, bound_curves, mixed
+from creepkit.rupture_assessment.strength import LONGEST_EXTRAPOLATION, LifeEstimate, bound_curves, mixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,12 +89,40 @@ def rupture_answer(assessment: RuptureAssessment) -> Answer:
 
 
 def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
-    """The tests, the verdict, and the strengths of the average method in a table."""
-    table, note = _strengths(assessment)
-    said = [Paragraph(note, "note")] if note else []
-    lives = [_lives(assessment)] if assessment.lives else []
+    """The tests, the verdict, times to rupture, and the strengths of the average method and by minimum rates."""
+    relation, groups = assessment.relation, assessment.tests.groups
+    scattering = [group for group in groups if _largest_scatter(assessment, group) >= LEAST_SCATTER_SHOWN]
+    note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
+    if groups:
+        note = f"a new heat has the bounds of the mean: no scatter between {listed([*map(plural_of, groups)])} is found"
+    of_heat, level = f"of a new {' and '.join(scattering)}" * bool(scattering), assessment.settings.level
+    tables = [_bounds("times to rupture in h", assessment.lives, of_heat, level)] if assessment.lives else []
+    for method in ("average", *([] if relation is None else [relation.times.method])):
+        by = "" if method == "average" else f" by {method}"
+        shown = [one for one in assessment.strengths if one.method == method]
+        tables.append(_bounds(f"creep rupture strengths in MPa{by}", shown, of_heat, level))
     head = Paragraph(_tests_text(assessment))
-    return [Paragraph(assessment.verdict, "lead"), head, *lives, table, *said]
+    return [Paragraph(assessment.verdict, "lead"), head, *tables, *([] if scattering else [Paragraph(note, "note")])]
+
+
+def _bounds(caption: str, found: Sequence[Any], of_heat: str, level: float) -> Table:
+    """Strengths at times, or times at stresses, with their bounds; of_heat : what those of a new heat are called."""
+    rows = []
+    for one in found:
+        is_life = isinstance(one, LifeEstimate)
+        at, value, digits = ("stress, MPa", one.hours, ".3g") if is_life else ("time, h", one.value, ".1f")
+        beyond = one.extrapolation and f"extrapolated: {one.extrapolation}"
+        row = {
+            "temperature": celsius_text(one.temperature),
+            at: f"{one.stress if is_life else one.hours:g}",
+            "median": "none" if value is None else f"{value:{'.4g' if is_life else digits}}",
+            f"{100 * level:g} % of the mean": _pair(one.bounds_of_mean, digits),
+            of_heat: _pair(one.bounds_of_heat, digits),
+            "of one test": _pair(one.bounds_of_test, digits),
+            "remarks": "; ".join(filter(None, (beyond, "" if is_life else one.reason))),
+        }
+        rows.append({name: cell for name, cell in row.items() if name})
+    return Table.of(f"{caption}, with bounds in brackets", rows)
 
 
 def _tests_text(assessment: RuptureAssessment) -> str:
@@ -104,23 +133,6 @@ def _tests_text(assessment: RuptureAssessment) -> str:
     run_outs = int(tests.censored.sum())
     of = f"{len(tests)} rupture tests{f', {run_outs} run-outs' if run_outs else ''}"
     return f"{of}, {span}, to {10 ** float(tests.log_time.max()):.4g} h{heats}"
-
-
-def _lives(assessment: RuptureAssessment) -> Table:
-    """The times to rupture of the average method."""
-    rows = [
-        {
-            "stress, MPa": f"{one.stress:g}",
-            "temperature": celsius_text(one.temperature),
-            "median, h": f"{one.hours:.4g}",
-            f"{100 * assessment.settings.level:g} % of the mean": _pair(one.bounds_of_mean, ".3g"),
-            "of a new heat": _pair(one.bounds_of_heat, ".3g"),
-            "of one test": _pair(one.bounds_of_test, ".3g"),
-            "remarks": one.extrapolation and f"extrapolated: {one.extrapolation}",
-        }
-        for one in assessment.lives
-    ]
-    return Table.of("times to rupture in h, with bounds in brackets", rows)
 
 
 def rupture_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -179,37 +191,6 @@ def _effect_lines(fit: RuptureFit) -> list[str]:
     return lines
 
 
-def _strengths(assessment: RuptureAssessment) -> tuple[Table, str]:
-    """The strengths of the average method, and what is said of a new heat, "" for nothing."""
-    shown = [one for one in assessment.strengths if one.method == "average"]
-    if assessment.relation is not None:
-        shown += [one for one in assessment.strengths if one.method == assessment.relation.times.method]
-    scattering = [g for g in assessment.tests.groups if _largest_scatter(assessment, g) >= LEAST_SCATTER_SHOWN]
-    rows = []
-    for one in shown:
-        remarks = (one.extrapolation and f"extrapolated: {one.extrapolation}", one.reason)
-        new_heat = {f"of a new {' and '.join(scattering)}": _pair(one.bounds_of_heat)} if scattering else {}
-        rows.append(
-            {
-                "method": one.method,
-                "temperature": celsius_text(one.temperature),
-                "time, h": f"{one.hours:g}",
-                "value": "none" if one.value is None else f"{one.value:.1f}",
-                f"{100 * assessment.settings.level:g} % of the mean": _pair(one.bounds_of_mean),
-                **new_heat,
-                "of one test": _pair(one.bounds_of_test),
-                "remarks": "; ".join(text for text in remarks if text),
-            }
-        )
-    note = ""
-    if not assessment.tests.groups:
-        note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
-    elif not scattering:
-        groups = " and ".join(map(plural_of, assessment.tests.groups))
-        note = f"a new heat has the bounds of the mean: no scatter between {groups} is found"
-    return Table.of("creep rupture strengths in MPa, with bounds in brackets", rows), note
-
-
 def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
     """Of the methods that count."""
     fits = [one.fit for one in assessment.ranked if one.weight >= SHOWN_WEIGHT]
@@ -218,7 +199,7 @@ def _largest_scatter(assessment: RuptureAssessment, group: str) -> float:
     return max(fit.scatter.get(group, 0.0) for fit in fits)
 
 
-def _pair(ends: tuple[float | None, float | None], digits: str = ".1f") -> str:
+def _pair(ends: tuple[float | None, float | None], digits: str) -> str:
     low, high = ("none" if end is None else f"{end:{digits}}" for end in ends)
     return f"[{low}, {high}]" if (low, high) != ("none", "none") else "none"
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.reports.answer import table_of_groups
-from creepkit.reports.blocks import Paragraph, as_text
+from creepkit.reports.answer import SLOPES, interval_text, key_figures, table_of_groups
+from creepkit.reports.blocks import Answer, Paragraph, as_text, ends, named, plural
+from creepkit.reports.description import NewTestInterval, rejected, tested_range
 from creepkit.reports.figures import empty_figure, place_legend
-from creepkit.reports.rate_panels import draw_plate, plate_size
+from creepkit.reports.rate_panels import draw_plate, plate_rates, plate_size
 from creepkit.reports.remarks import numerical_error_text
+from creepkit.reports.wording import say
+from creepkit.reports.words import PLATE
 from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
@@ -22,10 +27,52 @@ if TYPE_CHECKING:
     from creepkit.screening.results import ScreeningResult
 
 
+MOST_LAWS = 4
+"""Laws that a headline names."""
+
+
 def screening_text(plate: ScreeningResult) -> str:
     """The law, exponent and rate of each alloy, the share of each law in each class, and what failed."""
     table = table_of_groups({one.alloy: (one.best, one.decisive) for one in plate.identified})
     return as_text([*([table] if plate.identified else []), *map(Paragraph, summary_lines(plate))])
+
+
+def plate_answer(
+    fits: Sequence[tuple[str, Identification]], choices: Sequence[bool], *, failed: int, picture: Any = None
+) -> Answer:
+    """The laws of many materials in few words. fits : (material, best law). choices : whether each is decisive."""
+    (first, count), *others = Counter(fit.law.name for _, fit in fits).most_common(MOST_LAWS)
+    rejecting, missed = sum(rejected(fit) for _, fit in fits), [name for name, fit in fits if not fit.converged]
+    told = {"failed": failed, "not converged": len(missed), "choice": len(choices) if not all(choices) else 0}
+    values = {"failed": failed, "names": named(missed, "material"), "decisive": sum(choices), "choices": len(choices)}
+    of_others, materials = [f"{name} in {number}" for name, number in others], plural(len(fits), "material")
+    known = {"first": first, "count": count, "others": of_others, "materials": materials, "rejecting": rejecting}
+    following = "search" if missed else "laws" if 2 * rejecting > len(fits) else "use"
+    return Answer(
+        say(PLATE["headline"], **known, range=tested_range(*(fit for _, fit in fits))),
+        "",
+        figures=_plate_figures(fits),
+        cautions=[say(PLATE[kind], **values) for kind, many in told.items() if many],
+        next_step=PLATE[f"next {following}"],
+        picture=picture,
+        role="caution" * bool(rejecting),
+    )
+
+
+def _plate_figures(fits: Sequence[tuple[str, Identification]]) -> list[tuple[str, str, str, str]]:
+    """The largest and the smallest rate with their materials, and ends of exponents and of how far a new test lies."""
+    stress, strain, rates = plate_rates(fits)
+    at, known = f"{stress:.3g} MPa, {100 * strain:.2g} % strain", np.flatnonzero(np.isfinite(rates[:, 0]))
+    order = known[np.argsort(rates[known, 0])]
+    outer = [("largest", k) for k in order[-1:]] + [("smallest", k) for k in order[:1]]
+    found = [(f"{side} creep rate", fits[k][0], interval_text([*rates[k]], "%/h"), at) for side, k in outer]
+    exponents = [one.value for _, fit in fits for one in key_figures(fit)[:1] if one.name == SLOPES[0]]
+    factors = [np.exp(one.half_width) for _, fit in fits if (one := NewTestInterval.of(fit)) is not None]
+    if exponents:
+        found.append(("stress exponents", "", ends(exponents, 2), plural(len(exponents), "material")))
+    if factors:
+        found.append(("a new test, within a factor of", "", ends(factors, 2), "95 %, from the best to the worst law"))
+    return found
 
 
 def summary_lines(plate: ScreeningResult) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
-from creepkit.records.units import celsius_text
+from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.answer import equations, value_cells
 from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
 from creepkit.reports.description import rejected
@@ -65,29 +65,34 @@ def draw_parameter(axes: Axes, temperature_law: TemperatureLaw, k: int = 0) -> N
     bounds = [law.table[name].to_internal(b) * scale for b in law.table[name].bounds]
     low, high = (-np.inf, np.inf) if is_rate else bounds  # beyond which no interval goes
     error_bars = np.maximum([np.minimum(half_widths, values - low), np.minimum(half_widths, high - values)], 0.0)
-    axes.errorbar(estimates.temperatures, values, error_bars, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
+    axes.errorbar(
+        estimates.temperatures - ZERO_CELSIUS, values, error_bars, fmt="o", ms=4, color="0.25", capsize=2, lw=1
+    )
     T, drawn = np.linspace(*temperature_law.temperature_range, 60), {"": values}
+    celsius = T - ZERO_CELSIUS
     for candidate in temperature_law.candidates:
         form = candidate.forms[name]
         if form in drawn or (candidate.weight < MIN_WEIGHT_SHOWN and len(drawn) > 1):
             continue
         first, curve = len(drawn) == 1, shown_of(candidate.theta(T))
         drawn[form] = curve
-        axes.plot(T, curve, lw=1.8 if first else 1.0, label=f"{form} {_form_weight(temperature_law, k, form):.2f}")
+        axes.plot(
+            celsius, curve, lw=1.8 if first else 1.0, label=f"{form} {_form_weight(temperature_law, k, form):.2f}"
+        )
         if first:
             from scipy.stats import t as student
 
             quantile = float(student.ppf(0.975, candidate.degrees_of_freedom))
             half = quantile * _curve_standard_deviations(shown_of, candidate, T)
-            axes.fill_between(T, curve - half, curve + half, color="C0", alpha=0.15, lw=0)
+            axes.fill_between(celsius, curve - half, curve + half, color="C0", alpha=0.15, lw=0)
     every = np.concatenate([*drawn.values()])
     lowest, highest = float(every.min()), float(every.max())
     widths = min(1.2 * float(np.median(half_widths)), highest - lowest)
     margin = max(0.15 * (highest - lowest), widths, 0.02 * abs(highest) + 1e-9)
     beyond = 0.03 * float(np.ptp(T))
-    span(axes, "x", T[0] - beyond, T[-1] + beyond)
+    span(axes, "x", celsius[0] - beyond, celsius[-1] + beyond)
     span(axes, "y", lowest - margin, highest + margin, most=8)
-    axes.set(xlabel="temperature, K")
+    axes.set(xlabel="temperature, °C")
     axes.set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
     place_legend(axes, "form, weight", size=7)
 

@@ -16,23 +16,10 @@ from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.explanation import VERDICT_ODDS
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, LEAST_NOISE_FREEDOM
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES
+from creepkit.reports import words
 from creepkit.reports.blocks import first_of
 from creepkit.reports.remarks import challenge_text, nuisance_text
 from creepkit.reports.wording import amount_text, noises_text, say
-from creepkit.reports.words import (
-    CAUSE_CAUTIONS,
-    CAUSES,
-    CAUSES_AT_LENGTH,
-    CAUTIONS,
-    CHOICES,
-    ERRORS,
-    NEXT,
-    NOISE_UNKNOWN,
-    OF_VERDICTS,
-    SHORT_VERDICTS,
-    UNMET,
-    VERDICTS,
-)
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
@@ -75,7 +62,7 @@ MOST_WITHOUT_NOISE = 4
 
 def cause_headline(one: Explanation) -> str:
     """What the rates of tests show, in a few words."""
-    return say(CAUSES[_cause_kind(one)], **_of_cause(one))
+    return say(words.CAUSES[_cause_kind(one)], **_of_cause(one))
 
 
 def cause_sentence(one: Explanation) -> str:
@@ -83,14 +70,18 @@ def cause_sentence(one: Explanation) -> str:
     texts = [f"{name} = {v:.4g} [{low:.4g}, {high:.4g}]" for name, (v, low, high) in one.without.items()]
     known = {"cause": cause_headline(one), "without": ", ".join(texts), "errors": _errors(one)}
     kind = _cause_kind(one)
-    return say(CAUSES_AT_LENGTH["changes" if kind == one.kind != "one test" else kind], **known, **_of_cause(one))
+    return say(
+        words.CAUSES_AT_LENGTH.get("changes" if kind == one.kind != "one test" else kind, "{cause}"),
+        **known,
+        **_of_cause(one),
+    )
 
 
 def cause_caution(one: Explanation) -> str:
     """Of tests their size, as a rate and as what would make it, else that it is no verdict."""
     sizes = " and ".join(f"{factor:.2g}" for factor in one.factors or (np.exp(one.size),))
     kelvin = _kelvin(one) if _may_be_temperature(one) else ""
-    text = CAUSE_CAUTIONS[_cause_kind(one) if one.kind == "one test" else "others"]
+    text = words.CAUSE_CAUTIONS[_cause_kind(one) if one.kind == "one test" else "others"]
     return say(text, one=one, cause=cause_headline(one), odds=np.exp(one.odds), sizes=sizes, kelvin=kelvin)
 
 
@@ -100,11 +91,11 @@ def cause_next_step(one: Explanation) -> str:
     kind = _cause_kind(one)
     if one.kind == "one test" and one.odds < VERDICT_ODDS:
         kind = "temperature" if _may_be_temperature(one) else "record"
-    return say(NEXT[f"check {kind}"], one=one, key=key, value=value)
+    return say(words.NEXT[f"check {kind}"], one=one, key=key, value=value)
 
 
 def _cause_kind(one: Explanation) -> str:
-    """Which of CAUSES it is."""
+    """Which of words.CAUSES it is."""
     if one.is_of_law:
         return "curves" if one.is_of_curves else one.kind
     if one.kind == "two groups":
@@ -129,7 +120,7 @@ def _may_be_temperature(one: Explanation) -> bool:
 
 def _kelvin(one: Explanation) -> str:
     kelvin = one.errors["temperature"]
-    return say(ERRORS["kelvin"], kelvin=abs(kelvin), less="less" if kelvin < 0 else "more")
+    return say(words.ERRORS["kelvin"], kelvin=abs(kelvin), less="less" if kelvin < 0 else "more")
 
 
 def _errors(one: Explanation) -> str:
@@ -141,13 +132,13 @@ def _errors(one: Explanation) -> str:
         unit = next((unit for unit in known if abs(np.log(factor / unit)) < ROUND_TOLERANCE), 0.0)
         smaller = "smaller" if ratio < 1 else "larger"
         if unit or factor > LARGEST_LOAD:
-            text = say(ERRORS["factor"], quantity=quantity, factor=factor, smaller=smaller, unit=unit)
+            text = say(words.ERRORS["factor"], quantity=quantity, factor=factor, smaller=smaller, unit=unit)
             (units if unit else others).append(text)
     if _may_be_temperature(one):
         actual = one.temperature + one.errors["temperature"]
-        likely.append(say(ERRORS["temperature"], actual=actual, kelvin=_kelvin(one)))
+        likely.append(say(words.ERRORS["temperature"], actual=actual, kelvin=_kelvin(one)))
     if 1.0 / LARGEST_LOAD <= load <= LARGEST_LOAD:
-        likely.append(say(ERRORS["load"], change=abs(load - 1), lower="lower" if load < 1 else "higher"))
+        likely.append(say(words.ERRORS["load"], change=abs(load - 1), lower="lower" if load < 1 else "higher"))
     return " or ".join([*units, *likely] or others)
 
 
@@ -159,21 +150,21 @@ def adequacy_text(found: Adequacy) -> str:
     parts, p, contradicting = _parts(found), _p_value(found), found.contradicting
     kind, cause = _verdict_kind(found, parts), explanation_text(found)
     if cause and kind == "leaves" and not found.is_explained:
-        cause = say(OF_VERDICTS["rates"], cause=cause)
+        cause = say(words.OF_VERDICTS["rates"], cause=cause)
     return say(
-        VERDICTS[kind],
+        words.VERDICTS[kind],
         found=found,
         why=how_to_state_noise(found.not_judged, found.few_frames),
         sources=[*dict.fromkeys(one.noise_source for one in found.outputs)],
         qualified=qualification(found),
         scatter=scatter_text(found.rate_scatter) if found.rate_scatter > 0 else "",
-        doubt=OF_VERDICTS["doubt"] * (found.chi_square < IMPLAUSIBLE_CHI_SQUARE),
-        slow=OF_VERDICTS["slow"] * bool(np.isfinite(found.correlation)),
+        doubt=words.OF_VERDICTS["doubt"] * (found.chi_square < IMPLAUSIBLE_CHI_SQUARE),
+        slow=words.OF_VERDICTS["slow"] * bool(np.isfinite(found.correlation)),
         chi_square=_chi_square(found),
         p=p,
         curves=p * bool(found.outputs),
         contradiction="" if contradicting is None else contradiction_text(contradicting),
-        parts=" and ".join(parts) or OF_VERDICTS["noise"],
+        parts=" and ".join(parts) or words.OF_VERDICTS["noise"],
         largest="" if found.largest is None else _largest(found.largest),
         remedies=() if found.explanations else [one.description for one in found.remedies],
         cause=cause,
@@ -181,7 +172,7 @@ def adequacy_text(found: Adequacy) -> str:
 
 
 def _verdict_kind(found: Adequacy, parts: Sequence[str]) -> str:
-    """Which of VERDICTS is said of a law; parts : what it leaves."""
+    """Which of words.VERDICTS is said of a law; parts : what it leaves."""
     if found.verdict == "cannot be judged":
         return "unpredicted" if found.unpredicted else "not judged"
     if found.explains:
@@ -194,23 +185,22 @@ def _verdict_kind(found: Adequacy, parts: Sequence[str]) -> str:
 def _parts(found: Adequacy) -> list[str]:
     """What a law leaves unexplained, the largest in noises first."""
     left = sorted((o for o in found.outputs if o.discrepancy > 0), key=lambda o: -o.discrepancy_in_noises)
-    parts = [say(OF_VERDICTS["part"], one=o, amount=amount_text(o.discrepancy, o.output)) for o in left]
+    parts = [say(words.OF_VERDICTS["part"], one=o, amount=amount_text(o.discrepancy, o.output)) for o in left]
     if (found.scatters_too_much or (found.remedies and not parts)) and not found.explanations:
-        parts.append(say(OF_VERDICTS["scatter"], factor=np.exp(found.rate_scatter)))
+        parts.append(say(words.OF_VERDICTS["scatter"], factor=np.exp(found.rate_scatter)))
     return [*parts, *([] if found.contradicting is None else [contradiction_text(found.contradicting)])]
 
 
 def verdict_text(found: Adequacy | None) -> str:
     """The verdict in few words, with the p-value, or what is left in noises; "?" where nothing can be judged."""
     if found is None or found.verdict == "cannot be judged":
-        return SHORT_VERDICTS["not judged"]
+        return "?"
     kind = "leaves" if found.discrepancy_in_noises > 0 else "rates"
     if found.explanations and (found.lies_in_tests or kind == "rates"):
         kind = "cause"
     kind = "explains" if found.explains else "values" if found.contradicting is not None else kind
-    return say(
-        SHORT_VERDICTS[kind], found=found, cause=_cause(found), nuisance=[*(o.kind for o in found.implausible), ""][0]
-    )
+    nuisance = "".join(one.kind for one in found.implausible[:1])
+    return say(words.SHORT_VERDICTS[kind], found=found, cause=_cause(found), nuisance=nuisance)
 
 
 def _cause(found: Adequacy) -> str:
@@ -224,41 +214,37 @@ def explanation_text(found: Adequacy) -> str:
     first, second = found.explanations[:2]
     kind = "beside" if first.odds - second.odds > np.log(3.0) else "as likely"
     known = {"cause": cause_sentence(first), "other": cause_headline(second)}
-    return say(CAUSES_AT_LENGTH[kind], odds=first.odds - second.odds, **known)
+    return say(words.CAUSES_AT_LENGTH[kind], odds=first.odds - second.odds, **known)
 
 
 def qualification(found: Adequacy) -> str:
     """What follows "not rejected" where the law takes nuisances of implausible size; "" where it does not."""
-    if not found.implausible:
-        return ""
-    return say(OF_VERDICTS["qualified"], nuisance=nuisance_text(found.implausible[0]), more=len(found.implausible) - 1)
+    nuisances = [*map(nuisance_text, found.implausible)]
+    return say(words.OF_VERDICTS["qualified"], nuisance=nuisances[0], more=len(nuisances) - 1) if nuisances else ""
 
 
 def contradiction_text(found: ContradictingValues) -> str:
     """That minimum rates and rupture times are not of one law of this kind."""
     product = abs(np.log(found.rate_ratio * found.time_ratio))
-    return say(
-        OF_VERDICTS["contradiction"], one=found, trend=OF_VERDICTS["trend"] * bool(product <= np.log(NOTEWORTHY_RATIO))
-    )
+    trend = words.OF_VERDICTS["trend"] * bool(product <= np.log(NOTEWORTHY_RATIO))
+    return say(words.OF_VERDICTS["contradiction"], one=found, trend=trend)
 
 
 def _largest(one: LargestDeviation) -> str:
     rms = amount_text(one.rms, one.output) if one.rms > 0 else ""
     amount, above = amount_text(abs(one.deviation), one.output), "above" if one.deviation > 0 else "below"
-    return say(OF_VERDICTS["largest"], one=one, rms=rms, amount=amount, above=above)
+    return say(words.OF_VERDICTS["largest"], one=one, rms=rms, amount=amount, above=above)
 
 
 def _chi_square(found: Adequacy) -> str:
-    kinds = ["critical"] * (found.critical_chi_square > 0)
-    kinds += ["expected"] * (found.expected_chi_square > NOTEWORTHY_EXPECTATION)
-    remarks = "; ".join(say(OF_VERDICTS[kind], found=found) for kind in kinds)
-    return say(OF_VERDICTS["chi-square"], found=found, remarks=remarks)
+    expected = found.expected_chi_square if found.expected_chi_square > NOTEWORTHY_EXPECTATION else 0.0
+    return say(words.OF_VERDICTS["chi-square"], found=found, expected=expected)
 
 
 def _p_value(found: Adequacy) -> str:
     """The p-value; where it is the least of several times their number, how many and that one itself."""
     p, count = say("{found.p_value:p}", found=found), len(found.outputs) + 1
-    return p if count == 2 else say(OF_VERDICTS["adjusted"], found=found, p=p, count=count)
+    return p if count == 2 else say(words.OF_VERDICTS["adjusted"], found=found, p=p, count=count)
 
 
 def scatter_text(scatter: float) -> str:
@@ -275,7 +261,7 @@ def how_to_state_noise(outputs: Sequence[str], few_frames: Sequence[tuple[str, i
     tests = first_of([f"'{name}' ({count})" for name, count in few_frames], MOST_WITHOUT_NOISE, " tests")
     kind = "frames" if frames or not outputs else "rates" if MINIMUM_RATE_OUTPUT in outputs else "ruptures"
     fewest = LEAST_NOISE_FREEDOM / FREEDOM_PER_FRAME
-    return say(NOISE_UNKNOWN[kind], tests=tests, fewest=fewest, column=[*frames, "strain"][0])
+    return say(words.NOISE_UNKNOWN[kind], tests=tests, fewest=fewest, column=[*frames, "strain"][0])
 
 
 # ---- several laws ----------------------------------------------------------------------------------------------------
@@ -287,7 +273,7 @@ def unmet_text(ranking: Ranking, condition: str) -> str:
         return _of_best(ranking)
     if condition == "challenges" and ranking.challenges is not None:
         return "; and ".join(_refuted(ranking))
-    return say(UNMET[condition], best=ranking.best.law.name, decisive=DECISIVE_WEIGHT)
+    return say(words.UNMET[condition], best=ranking.best.law.name, decisive=DECISIVE_WEIGHT)
 
 
 def _refuted(ranking: Ranking) -> list[str]:
@@ -299,7 +285,7 @@ def ranking_verdict(ranking: Ranking) -> str:
     unmet, kind = ranking.unmet, "not decisive" if ranking.unmet else "decisive"
     kind = "alone" if "alternatives" in unmet else kind
     return say(
-        CHOICES[kind],
+        words.CHOICES[kind],
         **{"best": ranking.best.law.name, "count": len(ranking.laws), "verdict": _of_best(ranking)},
         alone=unmet_text(ranking, "alternatives"),
         reason=_reason(ranking) if kind == "not decisive" else "",
@@ -311,13 +297,13 @@ def ranking_verdict(ranking: Ranking) -> str:
 def same_functions(ranking: Ranking) -> str:
     """Which laws the best one stands for, in a clause; "" where none."""
     names = [ranked.fit.law.name for ranked in ranking.laws if ranked.same_as == ranking.best.law.name]
-    return say(CHOICES["same" if len(names) == 1 else "several same"], names=names) if names else ""
+    return say(words.CHOICES["same" if len(names) == 1 else "several same"], names=names) if names else ""
 
 
 def _of_best(ranking: Ranking) -> str:
     """What the tests say of the best law, in words that begin with "it"."""
     found = ranking.adequacy
-    return CAUTIONS["unknown"] if found is None else f"it {adequacy_text(found)}"
+    return words.CAUTIONS["unknown"] if found is None else f"it {adequacy_text(found)}"
 
 
 def _reason(ranking: Ranking) -> str:
@@ -336,16 +322,16 @@ def _reason(ranking: Ranking) -> str:
         if (a := r.fit.adequacy) and a.remedies and not (kind == "asked" and r.fit.law.name in ranking.further)
     }
     remedied = "" if kind == "none" and (own or refuted) else next(iter(found), "")
-    asked, lost = len(ranking.laws) - len(ranking.further), UNMET["convergence"] * ("convergence" in unmet)
+    asked, lost = len(ranking.laws) - len(ranking.further), words.UNMET["convergence"] * ("convergence" in unmet)
     others = [unmet_text(ranking, one) for one in unmet if one not in ("convergence", "adequacy")]
-    texts = {"left": adequacy_text, "explanation": explanation_text, "qualified": qualification, "cause": _cause}
+    texts = {"explanation": explanation_text, "qualified": qualification, "cause": _cause}
     of_adequacy = {name: "" if adequacy is None else text(adequacy) for name, text in texts.items()}
     return say(
-        CHOICES[kind],
+        words.CHOICES[kind],
         **{"best": ranking.best.law.name, "count": len(ranking.laws), "verdict": _of_best(ranking), "lost": lost},
-        weight=say(CHOICES["weight"], weight=ranking.laws[0].weight, lost=lost),
+        weight=say(words.CHOICES["weight"], weight=ranking.laws[0].weight, lost=lost),
         **{"refuted": refuted, "unmet": "; ".join(others), "names": names, "others": names[1:]},
         **{"remedied": remedied, "remedies": found.get(remedied, ()), "further": len(ranking.further)},
         **of_adequacy,
-        none=say(CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
+        none=say(words.CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
     )

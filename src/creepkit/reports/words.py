@@ -70,14 +70,12 @@ CAUTIONS = {
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {change} {side}",
     # offsets or drifts would move rates
-    "not included": "intervals leave out {kinds}: the law's rate moves by {change}{alone}",
+    "not included": "intervals leave out {kinds}<, another in {each}>: the law's rate moves by {change}<, that of "
+    "one test by {alone}>",
     # the checks of readings flag some
     "suspect": "readings of {tests} are suspect; nothing was dropped",
 }
 """{kind: a caution}, the most serious first."""
-
-IN_EACH_TEST, ONE_ALONE = ", another in each test", ", that of one test by {change}"
-"""Of several tests; and what it does to one by itself, where that is known."""
 
 REASONS = {
     # a law of creep and rupture misses both, in opposite ways
@@ -107,7 +105,7 @@ NEXT = {
     # nothing so simple would
     "check record": "check the record of {one.tests[0]}",
     # the search did not converge
-    "search": "repeat the search with more starts (--starts {starts}, or starts in a study){bounds}",
+    "search": "repeat the search with more starts (--starts {starts}, or starts in a study)< and bounds for {names}>",
     # the law is rejected, and one that was not tried has what it lacks
     "law": "try {law} as well, for {why}",
     # it is rejected, and no other was tried
@@ -156,7 +154,7 @@ MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
-CODES, MORE_CODES = "In {codes}", "creepkit export, also for other codes"
+CODES = "In {codes} (creepkit export, also for other codes)"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 ALL_DIGITS = "all digits{more}: details"
@@ -232,9 +230,7 @@ FORECAST = {
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a rejected law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}{allowed}",
-    # its end, where that is more than nothing
-    "allowed": "; intervals allow for {here} here",
+    "misses": "the law misses the rate of the nearest tests by a factor of {factor}<; intervals allow for {here} here>",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
@@ -247,6 +243,25 @@ FORECAST = {
     "next use": "plan with the interval, or narrow it by a further test (creepkit design)",
 }
 """{kind: what a forecast says}, its first line and how far to trust it, by which laws, cautions, what to do next."""
+
+PLATE = {
+    # always
+    "headline": "best law: {first} in {count} of {materials}<, {others:commas}>, for {range}<; "
+    "the tests reject it in {rejecting}>",
+    # of some
+    "failed": "of {failed} more no law was identified",
+    # the search did not converge
+    "not converged": "of {names} the search did not end: these values may not be the best",
+    # not all choices are
+    "choice": "the choice of the law is decisive in {decisive} of {choices}",
+    # some searches did not
+    "next search": "repeat the search of these with more starts (--starts, or starts in a study)",
+    # the tests reject most
+    "next laws": "compare further laws (creepkit list laws): the tests reject those of most materials",
+    # neither
+    "next use": "use each law within its tests; what to do next of each stands with it",
+}
+"""{kind: what the laws of several materials say first}, cautions and what to do next."""
 
 DESIGN = {
     # one run
@@ -334,8 +349,6 @@ CAUSES_AT_LENGTH = {
     "are they of one material?",
     # as above
     "stated groups": "{cause} at equal conditions ({one.label}: {one.tests:six})",
-    # as above
-    "curves": "{cause}",
     # the exponent or the energy
     "changes": "{cause}, more than this law lets it",
     # any, with the next likely one
@@ -403,12 +416,9 @@ OF_VERDICTS = {
     "slow": "; what is left is autocorrelated, noise or the law's own",
     # a cause of rates beside curves that are missed
     "rates": "of its rates, {cause}",
-    # chi-square, everywhere
-    "chi-square": "reduced chi-square {found.chi_square:.3g} with {found.freedom:.0f} degrees of freedom< ({remarks})>",
-    # a remark on it
-    "critical": "critical value {found.critical_chi_square:.3g}",
-    # noise is estimated from few readings
-    "expected": "expected {found.expected_chi_square:.3g}, as noise is estimated",
+    # chi-square, everywhere; what is expected where noise is estimated from few readings
+    "chi-square": "reduced chi-square {found.chi_square:.3g} with {found.freedom:.0f} degrees of freedom"
+    "<, critical value {found.critical_chi_square:.3g}><, expected {expected:.3g} as noise is estimated>",
     # of several outputs
     "adjusted": "<smallest {found.smallest_p_value:p}, >{p} adjusted for {count} comparisons (Bonferroni)",
     # minimum rates and rupture times
@@ -421,8 +431,6 @@ OF_VERDICTS = {
 """{kind: a part of a verdict}."""
 
 SHORT_VERDICTS = {
-    # nothing can be judged
-    "not judged": "?",
     # the p-value is 0.3 % or more
     "explains": "not rejected ({found.p_value:p})<, but only with a large {nuisance}>",
     # as it says
@@ -459,9 +467,9 @@ CHOICES = {
     # what the best law misses lies in tests
     "in tests": "of {count} laws tried {best} is best ({weight}), but {cause}: {explanation}",
     # the best law is rejected
-    "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best, {best} "
+    "none": "none of {count} laws tried explains the tests< as they are stated; {refuted:and}>. The best is {best} "
     "({weight}<, not told apart from {others:and}><; with {remedies:or}, which nobody modelled, {remedied} would "
-    "explain them>), {left}",
+    "explain them>); {verdict}",
     # a law that nobody asked for is not
     "asked": "{none} the tests<; with {remedies:or}, which nobody modelled, {remedied} would explain them>; of "
     "{further} more that were tried, {best} is not rejected by them ({weight}): plan tests that can refute it",
@@ -521,8 +529,6 @@ CHALLENGES = {
     "unknown sum": "a sum with {one.other}",
     # or a threshold
     "threshold": "{one.subject} of {one.size:.3g} MPa",
-    # which was not examined
-    "unknown threshold": "{one.subject}",
 }
 """{kind: what the tests allow beside the best law}, behind "but"."""
 
@@ -546,7 +552,7 @@ PERTURBATIONS = {
     # of temperature, of one test
     "drift": "a linear drift of {one.size:.2g} K over the test",
     # of several
-    "drifts": "independent drifts of the temperature, {one.size:.2g} K over each of {one.tests} tests",
+    "drifts": "independent drifts of temperature, {one.size:.2g} K over each of {one.tests} tests",
     # of what is stated or read, of one test
     "error": "an {error} of {one.amount} in the {what} of the test",
     # of several

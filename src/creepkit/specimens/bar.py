@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from creepkit import integration, kernels
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit.arrays import Floats
 from creepkit.integration.time_discretisation import SDIRK4_TEXT
 from creepkit.records import History, HistoryPrediction, NuisanceValues, Prediction, Status, assemble_prediction
 from creepkit.specimens.point_specimen import PointSpecimen
@@ -28,10 +28,12 @@ SEARCH_TOLERANCE = 1e-3
 class BarRun(Run):
     """A simulated bar, at the times of the run.
 
-    creep_strain : (times,) logarithmic. states : {name: (times,)} internal variables of the law.
+    creep_strain : (times,) logarithmic, along the axis, below zero where the bar is shortened. equivalent_strain :
+    (times,) what the law sees, which grows in compression as in tension. states : {name: (times,)} internal variables.
     """
 
     creep_strain: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
+    equivalent_strain: Floats = field(default_factory=lambda: np.zeros(0), repr=False)
     states: Mapping[str, Floats] = field(default_factory=dict, repr=False)
 
 
@@ -71,13 +73,6 @@ class Bar(PointSpecimen):
         """Derivative of the output to the creep strain; both, as creep (candidates, times)."""
         raise NotImplementedError
 
-    def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
-        """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN.
-
-        The integration says nothing, "", where it went on, and the output is not shown.
-        """
-        return reason
-
     # ---- of every bar ---------------------------------------------------------------------------------------------
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BarRun:
@@ -86,15 +81,14 @@ class Bar(PointSpecimen):
         result = self._integrate(law, theta, self._tests([plan]), False, keep_states=True)
         prediction = self._observed_prediction([plan], result)
         rows, status = prediction.values[0, 0, :, 0], Status(int(prediction.status[0, 0]))
-        end, hidden = float(prediction.end_times[0, 0]), (prediction.end_times != result.end_times).any()
-        reason = "" if hidden else integration.REASONS[int(result.terminations[0, 0])]
-        if status is not Status.COMPLETE:
-            reason = self.end_reason(plan, reason, rows, end)
+        end, reason = float(prediction.end_times[0, 0]), integration.REASONS[int(result.terminations[0, 0])]
         run = run_from_outputs(BarRun, plan, self.outputs, rows[:, None], status, end, reason)
         reached = np.isin(plan.times, run.times)
         assert result.states is not None
+        assert result.path is not None
         states = {symbol.name: result.states[0, reached, k] for k, symbol in enumerate(law.states)}
-        return replace(run, creep_strain=result.of(0)[0, reached], states=states)
+        own = {"creep_strain": result.of(0)[0, reached], "equivalent_strain": result.path[0, reached]}
+        return replace(run, **own, states=states)
 
     def predict_batch(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues, sensitivities: bool
@@ -115,11 +109,8 @@ class Bar(PointSpecimen):
             if result.jacobian is not None:
                 derivative = self.output_derivative(history, creep)[..., None]
                 jacobian = (result.jacobian[:, frames] * derivative)[:, :, None]
-            values, status, ends = self.observed_output(history, creep), result.status[:, k], result.end_times[:, k]
-            hidden = np.isnan(values) & np.isfinite(creep)
-            if hidden.any():
-                values, status, ends = _ended_where_hidden(hidden, values, status, ends, history.times)
-            parts.append(HistoryPrediction(values[..., None], status, ends, jacobian))
+            values = self.observed_output(history, creep)[..., None]
+            parts.append(HistoryPrediction(values, result.status[:, k], result.end_times[:, k], jacobian))
         return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
     def _integrate(
@@ -135,23 +126,6 @@ class Bar(PointSpecimen):
         return integration.integrate(
             kernel, theta, tests, settings=self.integration_settings(), jacobian=sensitivities, keep_states=keep_states
         )
-
-
-def _ended_where_hidden(
-    hidden: Bools, values: Floats, status: Ints, ends: Floats, times: Floats
-) -> tuple[Floats, Ints, Floats]:
-    """Values, status and ends where rows have ended at the last frame before one that no instrument shows.
-
-    hidden, values : (candidates, times).
-    """
-    rows, first = np.asarray(hidden.any(axis=1)), hidden.argmax(axis=1)
-    from_there_on = rows[:, None] & (np.arange(times.size) >= first[:, None])
-    before = np.where(first > 0, times[first - 1], 0.0)
-    return (
-        np.where(from_there_on, np.nan, values),
-        np.where(rows, int(Status.NOT_CONVERGED), status),
-        np.where(rows, np.minimum(before, ends), ends),
-    )
 
 
 def observed_strain(history: History, creep: Floats) -> Floats:

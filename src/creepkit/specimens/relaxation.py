@@ -3,7 +3,7 @@
     sigma = E (total strain - creep strain),    so that  d(sigma)/dt = -E f(sigma, ...)  while the strain is held.
 
 The total strain is mechanical, without thermal expansion, and the stress is the true one. An engineering strain
-becomes ln(1 + strain). The stress must not fall below zero: compression after a step down needs the specimen `point`.
+becomes ln(1 + strain). A strain that falls presses the bar once its stress has passed zero.
 """
 
 from __future__ import annotations
@@ -28,17 +28,13 @@ if TYPE_CHECKING:
     from creepkit.integration import PointTest
 
 
-STRESS_TOLERANCE = 1e-3
-"""Of the largest elastic stress: a stress below zero by more than this is no rounding."""
-
-
 @dataclass(frozen=True)
 class Relaxation(Bar):
     """A bar under prescribed total strain; its output is its true stress, MPa. Its histories need elastic data."""
 
     name: ClassVar[str] = "relaxation"
-    title: ClassVar[str] = "Uniaxial tension under held total strain, or steps and ramps of it"
-    outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "stress", grows=False, visible=1.0),)
+    title: ClassVar[str] = "A bar under held total strain, or steps and ramps of it"
+    outputs: ClassVar[tuple[Output, ...]] = (Output("stress", "signed stress", grows=False, visible=1.0),)
     loads: ClassVar[tuple[Load, ...]] = (Load("strain", "strain", "total strain"),)
     imposed_text: ClassVar[str] = (
         "Its true stress is Young's modulus times the difference of the logarithmic total strain that is imposed and "
@@ -53,40 +49,20 @@ class Relaxation(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The stress, (candidates, times) MPa; NaN where the bar is compressed.
-
-        creep : (candidates, times) logarithmic creep strain.
-        """
+        """The stress, (candidates, times) MPa; creep : (candidates, times) logarithmic creep strain."""
         test = point_test(history)
-        stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
-        return np.where(stress < -STRESS_TOLERANCE * float(np.max(test.driving.values)), np.nan, stress)
+        return np.asarray(test.driving.at(history.times) - test.stiffness * creep)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
         """Minus the modulus, (candidates, times) MPa; creep : (candidates, times)."""
         return np.full_like(creep, -point_test(history).stiffness)
-
-    def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
-        """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress.
-
-        output : (times,) MPa.
-        """
-        from creepkit.integration.core_structures import STEP_TOO_SMALL
-
-        driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)
-        compressed = "the stress falls below zero, and a compressed bar needs the specimen point"
-        stuck = reason == integration.REASONS[STEP_TOO_SMALL]
-        if not reason:
-            return compressed
-        if stuck and (driving.at(end + moment) < driving.at(end - moment) or driving.at(end) < 0.0):
-            return f"{reason}: {compressed}"
-        return reason
 
     def reference_stress(self, history: History) -> Floats:
         """The largest stress of a test and the least from there on, which no ramp passed, (2,) MPa, the least first.
 
         As measured; of a plan that of elasticity alone.
         """
-        driving = point_test(history).driving.values
+        driving = np.abs(point_test(history).driving.values)
         measured = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else driving
         stresses = measured[int(measured.argmax()) :] if measured.any() else driving
         stresses = stresses[stresses > 0]
@@ -99,7 +75,7 @@ class Relaxation(Bar):
     def reference_strain(self, history: History) -> float:
         """The largest creep strain that a test reached, as far as its stress says."""
         test = point_test(history)
-        fallen = test.driving.at(history.times) - history.outputs["stress"]
+        fallen = np.abs(test.driving.at(history.times) - history.outputs["stress"])
         return float(np.max(fallen[history.used], initial=0.0)) / test.stiffness
 
 

@@ -1,6 +1,7 @@
-"""Uniaxial tension: a bar under steps of stress or load and of temperature, observed by its creep strain.
+"""A bar in tension or compression, under steps of stress or load and of temperature, observed by its creep strain.
 
-Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep
+Stress and strain are above zero in tension. Under constant load the true stress is the nominal one times exp(creep
+strain). An engineering strain is exp(creep
 strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are
 predicted too.
 """
@@ -45,9 +46,9 @@ class Uniaxial(Bar):
     """A bar under prescribed stress or load; its output is its strain, of the measure that its history names."""
 
     name: ClassVar[str] = "uniaxial"
-    title: ClassVar[str] = "Uniaxial tension under steps of stress or load"
+    title: ClassVar[str] = "Uniaxial tension or compression under steps of stress or load"
     outputs: ClassVar[tuple[Output, ...]] = (Output("strain", "strain", visible=2e-4),)
-    loads: ClassVar[tuple[Load, ...]] = (Load("stress", "stress"),)
+    loads: ClassVar[tuple[Load, ...]] = (Load("stress", "signed stress"),)
     conditions: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({"stress": (40.0, 300.0)})
     """Stresses, MPa, of the paper's dimple of 0.5 mm under its pressures, about 12.5 times them."""
     dataset_names: ClassVar[Mapping[str, str]] = MappingProxyType({"jump_time": "Tj"})
@@ -166,7 +167,7 @@ class StrainLevels:
 
     test : the point test that is followed to the horizon.
     frames : (levels,) the frame of each. creep : (frames,) logarithmic creep strain that was measured; a frame where it
-        is not finite or not above SMALLEST_STRAIN has no level.
+        is not finite or not above SMALLEST_STRAIN has no level, nor has any of a bar that is pressed.
     """
 
     test: PointTest
@@ -178,6 +179,8 @@ class StrainLevels:
 def strain_levels(history: History, test: PointTest) -> StrainLevels:
     """The levels of a history; `test` is what its material point goes through."""
     creep = _measured_creep_strain(history)
+    if (test.driving.values < 0.0).any():
+        creep = np.full_like(creep, np.inf)
     frames = np.flatnonzero(np.isfinite(creep) & (creep > SMALLEST_STRAIN))
     frames = frames[np.argsort(creep[frames], kind="stable")]
     last = max(float(history.times[-1]), history.rupture_time or 0.0)

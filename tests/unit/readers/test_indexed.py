@@ -217,7 +217,7 @@ def test_answers_are_added_to_what_is_there(tmp_path):
 
 
 def test_all_errors_of_a_table_come_at_once(tmp_path):
-    table = "test,T (C),stress_MPa,tr (h)\nA,600,x,900\nB,600,90,slow pokes\nB2,600,90,5000*\nC,600,-5,20\n"
+    table = "test,T (C),stress_MPa,tr (h)\nA,600,x,900\nB,600,90,slow pokes\nB2,600,90,5000*\nC,600,-2e5,20\n"
     written(tmp_path, r__csv=table)
     with pytest.raises(SeveralErrors) as caught:
         ck.read_histories(tmp_path)

@@ -89,7 +89,7 @@ def test_what_makes_no_sense_is_refused():
         (lambda: history(times=[], source="x.csv"), "^x.csv: no frames"),
         (lambda: StressSteps(()), "must start at time 0"),
         (lambda: StressSteps(((0, 100), (0, 120))), "follow one another in time"),
-        (lambda: constant_stress(-1.0), r"from 0 to 1e5 MPa in every step, found \[-1.0\]"),
+        (lambda: constant_stress(-1e6), r"from -1e5 to 1e5 MPa in every step, found \[-1000000.0\]"),
         (lambda: constant_stress(1.0, "force"), "'force'; allowed is 'load' or 'stress'"),
         (lambda: PressureJump(8, 10, 5), "Tj after the first ramp"),
         (lambda: PressureJump(0, 10, 50), "above zero"),

@@ -373,8 +373,8 @@ def _stress_history(history: History, predictor: Predictor | None, times: Floats
     itself, as in relaxation, has all of its reference stresses at all times.
     """
     program, test_stresses = history.loading.program(), reference_stresses(history, predictor)
-    levels = np.unique(program.values[program.values > 0])
-    load = program.at(times)
+    levels = np.unique(np.abs(program.values[program.values != 0]))
+    load = np.abs(program.at(times))
     if history.loading.quantity == "stress" and test_stresses.size == program.values.size:
         return np.asarray(load[:, None])
     if test_stresses.size == levels.size:

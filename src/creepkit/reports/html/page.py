@@ -46,13 +46,13 @@ from creepkit.reports.prediction_bands import WIDEST
 from creepkit.reports.ranking import equivalents_among_remaining, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
 from creepkit.reports.rupture import rupture_blocks, strength_blocks
+from creepkit.reports.screening import plate_answer
 from creepkit.reports.svg import PageFigures
 from creepkit.reports.temperature_law import law_blocks, study_blocks
 from creepkit.reports.verdicts import scatter_text
 from creepkit.screening.results import AlloyResult
 
 if TYPE_CHECKING:
-    from creepkit.discovery.discover import TemperatureStudy
     from creepkit.extraction.extraction import Extraction
     from creepkit.instruments.imposed import Imposed
     from creepkit.reports.contents import ReportContents, ReportGroup
@@ -151,11 +151,17 @@ def block_shown(block: Block, names: LawNames) -> Block:
     return block
 
 
+AT_BOUND = " (search bound)"
+"""Behind an end of an interval, where a page has room for no more than a sign before it."""
+
+
 def _value_shown(value: str, ends: Sequence[str]) -> str:
     """A value, with its interval where that is all that is known, or that it lies at a bound of its search."""
     if not value.startswith("="):
-        return f"{value} [{', '.join(ends)}]"
-    return f"{value}{' (at the bound of its search)' * (f'{value[2:]} (search bound)' in ends)}"
+        known = [end.removesuffix(AT_BOUND) for end in ends]
+        marks = ["≤ " * (ends[0] != known[0]), "≥ " * (ends[1] != known[1])]
+        return f"{value} [{', '.join(map(''.join, zip(marks, known, strict=True)))}]"
+    return f"{value}{' (at the bound of its search)' * (f'{value[2:]}{AT_BOUND}' in ends)}"
 
 
 # ---- findings --------------------------------------------------------------------------------------------------------
@@ -192,10 +198,9 @@ def findings_section(contents: ReportContents, figures: PageFigures) -> PageSect
         drawn = [(one.name, one.fit) for one in _by_law(found)]
         said = [(contents.forecast_groups.get(name, name), one) for name, one in contents.forecasts.items()]
         blocks.append(Items([f"{group}: {figure.line}" for group, one in said for figure in asked_figures(one)]))
-        blocks.append(Paragraph(_overview(contents), "lead"))
-        blocks.append(
-            figures.picture(lambda: plate_figure(drawn), title, f"{title}; the table holds the numbers.", caption)
-        )
+        picture = figures.picture(lambda: plate_figure(drawn), title, f"{title}; the table holds the numbers.", caption)
+        choices = [one.decisive for one in found if one.decisive is not None]
+        blocks.insert(0, plate_answer(drawn, choices, failed=len(contents.groups) - len(found), picture=picture))
     return PageSection("findings", "Findings", blocks)
 
 
@@ -216,21 +221,6 @@ def _by_law(found: Sequence[ReportGroup]) -> list[ReportGroup]:
     laws = [one.fit.law.name for one in found]
     parts = {one.name: [int(p) if p.isdecimal() else p for p in re.split(r"(\d+)", one.name)] for one in found}
     return sorted(found, key=lambda one: (-laws.count(one.fit.law.name), one.fit.law.name, parts[one.name]))
-
-
-def _overview(contents: ReportContents) -> str:
-    found = contents.identified
-    explained = sum(one.fit.adequacy is not None and one.fit.adequacy.explains for one in found)
-    laws = [one.fit.law.name for one in found]
-    counts = sorted({name: laws.count(name) for name in laws}.items(), key=lambda pair: (-pair[1], pair[0]))
-    named = ", ".join(f"{name} in {count}" for name, count in counts[:8])
-    compared = [one for one in found if one.decisive is not None]
-    decisive = sum(one.decisive is True for one in compared)
-    decided = f" The choice of the law is decisive in {decisive} of {len(compared)}." if compared else ""
-    return (
-        f"Laws were identified of {len(found)} of {plural(len(contents.groups), 'material')}. The best law is {named}. "
-        f"The tests do not reject it at their noise in {explained} of {len(found)}.{decided}"
-    )
 
 
 # ---- materials -------------------------------------------------------------------------------------------------------
@@ -298,17 +288,15 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
     def rupture(one: Any, figures: PageFigures, of: str) -> list[Block]:
         return [*(strength_blocks(one) if identified else []), *rupture_blocks(one, figures, of)]
 
+    def trends(one: Any, *how: Any) -> list[Block]:
+        return (law_blocks if isinstance(one, TemperatureLaw) else study_blocks)(one, *how)
+
     records, imposed = "Loads and temperatures from instrument records", contents.imposed
     stages: dict[str, tuple[str, Mapping[str, Any], Callable[..., list[Block]], Callable[[Any], str]]] = {
         "extraction": ("Extraction from camera frames", contents.extractions, _extraction_blocks, _outputs_text),
         "imposed": (records, imposed, _imposed_blocks, lambda one: f"lag of the clocks {one.alignment.lag:.4g} s"),
         "composition": ("Creep over compositions", contents.composition, composition_blocks, map_sentence),
-        "temperature": (
-            "Trends with temperature",
-            contents.temperature,
-            _trends,
-            lambda one: "values over temperature",
-        ),
+        "temperature": ("Trends with temperature", contents.temperature, trends, lambda one: "values over temperature"),
         "rupture": ("Rupture", contents.rupture, rupture, lambda one: f"{plural(len(one.ranked), 'method')} compared"),
         "forecasts": ("Forecasts", contents.forecasts, forecast_blocks, lambda one: forecast_answer(one).headline),
         "design": ("Further tests", contents.design, design_blocks, lambda one: one.sentence),
@@ -324,10 +312,6 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
                 for k, (name, one) in enumerate(zip(results, blocks, strict=True), start=1)
             ]
             yield PageSection(identifier, title, (), inner, result=f"{len(results)} results")
-
-
-def _trends(one: TemperatureLaw | TemperatureStudy, figures: PageFigures, of: str) -> list[Block]:
-    return law_blocks(one, figures, of) if isinstance(one, TemperatureLaw) else study_blocks(one, figures, of)
 
 
 def _outputs_text(extraction: Extraction) -> str:

@@ -152,7 +152,7 @@ def test_a_truth_outside_the_set_is_flagged_and_never_decisive(seed):
     ranking = ck.select(LAWS, tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, further_laws=0)
     assert not ranking.decisive
     assert ranking.further == ()
-    assert ranking.verdict.startswith("not decisive: none of 4 laws tried explains the tests. The best, ")
+    assert ranking.verdict.startswith("not decisive: none of 4 laws tried explains the tests. The best is ")
 
 
 def test_a_best_law_with_damage_is_tried_with_primary_creep_and_in_no_sum_with_another_damage():
@@ -312,8 +312,8 @@ APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and 
 SENTENCES = [
     (
         ranking_of([1.0, 0.0, 0.0], [LEFT] * 3),
-        f"{NONE.format(3)}. The best, norton (weight 1.00 of the laws tried), leaves 0.004 % of strain (2 times its "
-        "stated noise) unexplained",
+        f"{NONE.format(3)}. The best is norton (weight 1.00 of the laws tried); it leaves 0.004 % of strain (2 times "
+        "its stated noise) unexplained",
         "Most in strain of 'bar 1' about 1.5 h, where it lies 0.004 % above what was measured",
     ),
     (ranking_of([0.5, 0.45, 0.05], challenges=(THINNER,)), f"{APART}; {SMALLER}; the best is norton: it {EXPLAINS}"),
