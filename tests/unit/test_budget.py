@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7099,
     "records": 2470,
     "registry": 615,
-    "reports": 6686,
+    "reports": 6688,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,

@@ -31,11 +31,13 @@ SHOWN = {
     "Ranking": "headline=best.headline verdict decisive adequacy further failed challenges laws",
     "RankedLaw": "excess weight chi_square",
     "Registered": "",
-    "RuptureAssessment": "verdict decisive ranked rejected relation strengths lives checks level=settings.level notes "
-    "provenance",
-    "RuptureFit": "method degree fixed log_likelihood scale scatter effects",
+    "RuptureAssessment": "verdict decisive methods=ranked rejected relation strengths lives checks level=settings.level "
+    "notes provenance",
+    "RuptureFit": "method degree fixed log_likelihood scale_log10=scale scatter_log10=scatter effects_log10=effects",
     "ScreeningResult": "alloys=results law_fractions failures notes",
     "Specimen": "name title outputs nuisances",
+    "StrengthEstimate": "strength=value hours temperature method bounds_of_mean bounds_of_heat bounds_of_test "
+    "extrapolation reason",
     "StudyResult": "title stages exclusions report",
     "TemperatureLaw": "law=law.name criterion_data temperature_range T_ref forms plausible_forms candidates notes",
     "TestForecast": "name condition=history.condition outputs times includes extrapolation notes caution misfit inside",
