@@ -26,7 +26,7 @@ BUDGET = {
     "exporters": 3328,
     "extraction": 1289,
     "fem": 1440,
-    "files": 1301,
+    "files": 1308,
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 790,
@@ -37,22 +37,22 @@ BUDGET = {
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1150,
-    "readers": 7035,
-    "records": 2469,
+    "quality": 1211,
+    "readers": 7099,
+    "records": 2470,
     "registry": 615,
-    "reports": 6682,
+    "reports": 6686,
     "rupture_assessment": 1825,
     "sampling": 960,
     "screening": 572,
     "specimens": 3176,
-    "studies": 2794,
+    "studies": 2802,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_295
+TESTS = 31_519
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

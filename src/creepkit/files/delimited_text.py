@@ -194,6 +194,18 @@ def split_lines(
         yield number, line, cells
 
 
+_UNCERTAINTY = re.compile(
+    r"(?P<value>\d(?:\s*(?P<unit>[^\W\d_]\w{0,3}|°\s*[CFK]|%))?)\s*(?:±|\+/-)\s*\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?"
+    r"(?:\s*(?P=unit))?"
+)
+"""What stands behind a value for its uncertainty, 120 ± 1 or 120 MPa ± 1 MPa."""
+
+
+def without_uncertainty(text: str) -> str:
+    """A text in which values stand without their uncertainties."""
+    return _UNCERTAINTY.sub(r"\g<value>", text) if "±" in text or "+/-" in text else text
+
+
 def parse_number(text: str, dialect: Dialect, location: str, name: str) -> float:
     """A cell as a number; `name` and `location` say in the HistoryError what it was meant to be, and where it stands.
 
@@ -292,7 +304,7 @@ def _score(sample: Sequence[str], delimiter: str) -> tuple[bool, int, int]:
         if len(cells) < 2 or (delimiter == " " and "\t" in line.strip()):  # which tabs take apart
             continue
         counts[len(cells)] = counts.get(len(cells), 0) + 1
-        for cell in (cell.rstrip("% ") for cell in cells):
+        for cell in (without_uncertainty(cell).rstrip("% ") for cell in cells):
             if cell and (cell[0] in "+-.," or "0" <= cell[0] <= "9"):
                 is_numeric = NUMBERS["."].fullmatch(cell) or (delimiter != "," and NUMBERS[","].fullmatch(cell))
                 numbers += 1 if is_numeric or is_clock_time(cell) else 0 if _WITH_UNIT.fullmatch(cell) else -2
@@ -316,7 +328,7 @@ def _decimal(lines: Iterable[str], delimiter: str, place: str) -> str:
             break
         if "," not in line and "." not in line:
             continue
-        for cell in (cell.rstrip("% ") for cell in _possible_numbers(line, delimiter)):
+        for cell in (without_uncertainty(cell).rstrip("% ") for cell in _possible_numbers(line, delimiter)):
             if "," in cell and NUMBERS[","].fullmatch(cell):
                 if _THOUSANDS_LIKE.fullmatch(cell):
                     doubtful = doubtful or cell

@@ -18,6 +18,7 @@ import numpy as np
 from creepkit.checked_arguments import checked
 from creepkit.errors import HistoryError
 from creepkit.language.elastic import STATE_MODULUS
+from creepkit.quality.few_readings import doubtful_readings
 from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import decreasing_frames, fracture_frames, outlier_frames, unloading_frames
 from creepkit.quality.idle_time import idle_flags
@@ -216,12 +217,18 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
 def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
     """Suspect frames of a history; each check uses the frames that those before it have left."""
     result: list[QualityFlag] = []
-    searches = (fracture_frames, unloading_frames, decreasing_frames, outlier_frames)
+    searches = (fracture_frames, unloading_frames, decreasing_frames, _outliers)
     for kind, search in zip(FRAME_FLAG_KINDS, searches, strict=True):
         if kind in kinds and (found := list(search(history))):
             history = _with_frames_unused(history, [k for flag in found for k in flag.frames])
             result += found
     return result
+
+
+def _outliers(history: History) -> Iterator[QualityFlag]:
+    found = list(outlier_frames(history))
+    yield from found
+    yield from (one for one in doubtful_readings(history) if one.frames not in [other.frames for other in found])
 
 
 def _with_frames_unused(history: History, frames: Sequence[int]) -> History:

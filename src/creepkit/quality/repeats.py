@@ -131,7 +131,7 @@ def agreement_by_chance(one: History, two: History) -> float:
     leading = growing_output(one)
     for name in names:
         a, b = one.outputs[name], two.outputs[name]
-        step_a, step_b = _last_digits(a), _last_digits(b)
+        step_a, step_b = last_digits(a), last_digits(b)
         first, second = pairs
         known = np.isfinite(a[first]) & np.isfinite(b[second])
         first, second = first[known], second[known]
@@ -168,7 +168,7 @@ def _noise(history: History, name: str) -> float:
     if int(usable.sum()) < FEWEST_FRAMES or (np.diff(history.times[usable]) <= 0).any():
         return 0.0
     noise = noise_standard_deviation(history.times[usable], values[usable])
-    return noise if noise > VISIBLE_NOISE * float(np.median(_last_digits(values)[usable])) else 0.0
+    return noise if noise > VISIBLE_NOISE * float(np.median(last_digits(values)[usable])) else 0.0
 
 
 def _common_frames(one: History, two: History) -> tuple[Ints, Ints] | None:
@@ -192,10 +192,10 @@ def _agree(a: Floats, b: Floats, step_a: Floats, step_b: Floats) -> Bools:
 
 
 def _time_digits(times: Floats) -> Floats:
-    return np.asarray(np.max([unit * _last_digits(times / unit) for unit in TIME_UNITS], axis=0))
+    return np.asarray(np.max([unit * last_digits(times / unit) for unit in TIME_UNITS], axis=0))
 
 
-def _last_digits(values: Floats) -> Floats:
+def last_digits(values: Floats) -> Floats:
     """(values,) size of the last decimal digit in which each value is written, 0 where it is exact.
 
     Values that are written with fixed decimals share it, also where a constant was added to all of them; those with a

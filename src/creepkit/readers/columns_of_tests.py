@@ -1,6 +1,6 @@
 """Columns of a table with one row a test: what their names mean, in which rows the names stand, where the tests begin.
 
-Names are understood in English, German, French, Italian and Spanish, with their unit behind `_`, `,` or `/`, in
+Names are understood in English, German, French, Italian, Spanish and Dutch, with their unit behind `_`, `,` or `/`, in
 brackets, or in a row of its own. Rows of a head may stand in any order; a name may stand above several columns, as
 `Time to strain (h)` does above `0.2 %` and `1 %`.
 """
@@ -12,12 +12,12 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
-from creepkit.files.delimited_text import Dialect, is_number
+from creepkit.files.delimited_text import Dialect, is_number, without_uncertainty
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column, plain_words
 from creepkit.readers.names import NAME_SYNONYMS, NAMES_OF, SYMBOLS
-from creepkit.readers.table import CellTable, TableRow
+from creepkit.readers.table import CellTable, TableRow, with_columns
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
     NameTable,
@@ -101,17 +101,17 @@ class TestColumn:
 
 _IS_TIME = re.compile(
     r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours"
-    r"|tempo|tiempo|ore|horas?|durata|duracion|vita|vida|giorni|dias)\b|zeit\b"
+    r"|tempo|tiempo|ore|horas?|durata|duracion|vita|vida|giorni|dias|tijd|duur|uur|uren|dagen|levensduur)\b|zeit\b"
 )
-RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b|velocit(?:a|y)\b|velocidad\b")
+RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b|velocit(?:a|y)\b|velocidad\b|snelheid\b")
 _OF_MINIMUM = re.compile(r"\b(?:min\w*|mcr|steady|second\w*|station\w*|sekund\w*|lowest|smallest|kleinste\w*)\b")
 _CREEP_RATE = re.compile(
-    r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*|velocita|velocidad|di|deformazione"
+    r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*|kruip\w*|velocita|velocidad|di|deformazione"
     r"|fluencia|deformacion) ?)+"
 )
 _ANOTHER_RATE = re.compile(
     r"\b(?:average\w*|avg|mean|mittler\w*|durchschnitt\w*|moyenne?|tertia\w*|prima\w*|initial\w*|anfang\w*|final\w*"
-    r"|start|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
+    r"|gemiddeld\w*|start|end|max\w*|at|bei|nach|after|apres|rupture|fracture|failure|bruch|last|first)\b"
 )
 """Of a rate that is the minimum one, that may be it, and that is another one."""
 
@@ -120,18 +120,19 @@ _RATE_SYMBOL = re.compile("[εɛe]\u0307[ _]?(?:min|ss?|m|st|c)?")
 """A dot above the strain, its letters apart from their accents."""
 
 
-_OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine|rottura|rotura)\b")
+_OF_RUPTURE = re.compile(r"\b(?:rupt\w*|fail\w*|fracture|break|bruch\w*|ruine|rottura|rotura|breuk|bezwijken)\b")
 _OF_NO_TEST = re.compile(
     r"\b(?:specified|specification|required|requirement|expected|predict\w*|calculat\w*|computed|estimat\w*|extrapol\w*"
     r"|min(?:imum|imal\w*)?|minimale|guaranteed|design|target|theoretical|allow\w*|nominal|planned|soll\w*|mindest\w*"
     r"|gefordert\w*|vorhergesagt\w*|berechnet\w*|erwartet\w*|geschatzt\w*|geplant\w*|prev[iu]\w*|calculee?s?|estimee?s?"
-    r"|previst\w*|calcolat\w*|calculad\w*|stimat\w*|estimad\w*|richiest\w*|requerid\w*|exigee?s?|requise?s?|specifiee?s?|attendue?s?|theorique)\b"
+    r"|previst\w*|calcolat\w*|calculad\w*|stimat\w*|estimad\w*|richiest\w*|requerid\w*|exigee?s?|requise?s?|specifiee?s?|attendue?s?|theorique"
+    r"|verwacht\w*|berekend\w*|voorspeld\w*|vereist\w*|geschat)\b"
 )
 """Of what was asked of a test, or is that of a model."""
 
 
 _OF_OTHERS = re.compile(
-    r"elong|dehnung\b|strain\b|allong|allung|alarg|parameter|ratio|log|sd\b|std|error|stress\b|date|datum"
+    r"elong|dehnung\b|rek\b|strain\b|allong|allung|alarg|parameter|ratio|log|sd\b|std|error|stress\b|date|datum"
 )
 _FACTOR = re.compile(
     r"[x×*·]?\s*(?<![\d.])(?:10\s*\^?\s*([\-−]\d+|⁻[⁰¹²³⁴-⁹]+)|1[eE](-\d+)"
@@ -141,11 +142,13 @@ _FACTOR = re.compile(
 positive one behind a stroke belongs to the time there: %/10^3 h."""
 
 
-_PER_CENT = r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|pour ?cent\b|per ?cento\b|por ?ciento\b)"
+_PER_CENT = (
+    r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|procent\b|pour ?cent\b|per ?cento\b|por ?ciento\b)"
+)
 _SYMBOL_TO_STRAIN = re.compile(rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?", re.IGNORECASE)
 _UNIT_IN_NAME = {
-    "h": r"hours?|hrs?|stunden|heures?|ore|horas",
-    "d": r"days|tage|jours|giorni|dias",
+    "h": r"hours?|hrs?|stunden|heures?|ore|horas|uur|uren",
+    "d": r"days|tage|jours|giorni|dias|dagen",
     "min": r"minutes|minuten",
 }
 
@@ -209,7 +212,9 @@ def _quantity_by_words(name: str, unit: str) -> str:
 def is_bare_rate(name: str) -> bool:
     """Whether a name is that of a creep rate of which it does not say that it is the smallest."""
     plain = plain_words(name)
-    return _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech|fluencia", plain) is not None
+    return (
+        _CREEP_RATE.fullmatch(plain) is not None and re.search("creep|fluage|kriech|kruip|fluencia", plain) is not None
+    )
 
 
 def _strain_reached(written: str) -> float | None:
@@ -270,7 +275,7 @@ _SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
 
 def is_number_like(cell: str, dialect: Dialect) -> bool:
     """Whether a cell holds a number, perhaps marked as a run-out."""
-    return is_number(cell, dialect) or _NUMBER_LIKE.fullmatch(cell) is not None
+    return is_number(cell, dialect) or _NUMBER_LIKE.fullmatch(without_uncertainty(cell)) is not None
 
 
 def _is_measured(cell: str, dialect: Dialect) -> bool:
@@ -314,6 +319,24 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
                 return TestTableHead(tuple(wider), higher, start, body)
         return TestTableHead(tuple(names), start, start, body)
     return None
+
+
+def side_by_side(table: CellTable) -> list[CellTable]:
+    """The tables of tests beside one another in a table, whose columns begin with the same name; else the table alone.
+
+    What stands alone in a row above their names is of all of them.
+    """
+    for at, row in enumerate(table.rows[:_SEARCHED]):
+        named = [k for k, cell in enumerate(row.cells) if cell]
+        starts = [k for k in named if row.cells[k] == row.cells[named[0]]]
+        parts = [range(*ends) for ends in pairwise([*starts, len(row.cells)])]
+        if len(starts) > 1 and all(is_test_table([row.cells[k] for k in part]) for part in parts):
+            titles = [one for one in table.rows[:at] if only_text(one, table.dialect) and one.cells[0]]
+            others = [one for one in table.rows if one not in titles]
+            rows = ([one for one in with_columns(others, part) if any(one.cells)] for part in parts)
+            of_parts = zip(rows, parts, strict=True)
+            return [replace(table, rows=[*titles, *own], positions=part) for own, part in of_parts]
+    return [table]
 
 
 def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:

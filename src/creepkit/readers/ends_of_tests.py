@@ -1,5 +1,5 @@
-"""How a test ended, by rupture or before it, from what laboratories write of it in English, German, French, Italian and
-Spanish.
+"""How a test ended, by rupture or before it, from what laboratories write of it in English, German, French, Italian,
+Spanish and Dutch.
 
 A text is taken apart into clauses and words without accents. Words of rupture count unless they are negated ("not yet
 broken", "kein Bruch", "pas de rupture") or said to lie ahead ("removed before rupture"). A column is decided by the
@@ -35,48 +35,50 @@ def _words(*alternatives: str) -> re.Pattern[str]:
 
 
 _RUPTURE = (
-    r"rupt(?:ur\w*|ed|s)?|frac|gebr|ausfall\w*|broken?|brk|breaks?|breaking"
-    r"|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*|snapped|parted"
-    r"|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?|bricht"
-    r"|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
-    r"|bris(?:e|ee|es|ees|er|ure)|defaillance"
-    r"|rott[aoei]|rottur[ae]|spezzat\w*|cedut[aoei]|fratturat\w*|rot[ao]s?|rotura|rompio|fracturad\w*|quebrad\w*"
+    r"rupt(?:ur\w*|ed|s)?|frac|gebr|ausfall\w*|broken?|brk|breaks?|breaking|breakage|fail(?:s|ed|ing|ures?)?|fractur\w*"
+    r"|snapped|parted|(?:zer)?gebrochen\w*|zerbrochen\w*|(?:kriech|zeitstand|dauer|proben|gewalt|sprod|rest)?br[uü]che?"
+    r"|bricht|(?:ab|durch)?gerissen\w*|zerrissen\w*|versag\w*|romp(?:u|us|ues?|t|re)|cass(?:e|ee|es|ees|er|ure)"
+    r"|bris(?:e|ee|es|ees|er|ure)|defaillance|rott[aoei]|rottur[ae]|spezzat\w*|cedut[aoei]|fratturat\w*|rot[ao]s?"
+    r"|rotura|rompio|fracturad\w*|quebrad\w*|gebroken|(?:kruip)?breuk|bezweken|(?:ge|door)scheurd\w*"
 )
 _CENSORED = r"(?:right |left )?cens(?:or\w*)?|censur\w*|zensi?er\w*|suspen[sd]\w*|sospes\w*"
 _GOES_ON = (
-    rf"run ?outs?|(?:failure|rupture|fracture) free|{_CENSORED}|unbroken|unfailed"
-    r"|unruptured|unfractured|discontinu\w+|surviv\w*|survecu\w*|running"
-    r"|on ?going|in progress|(?:in|on|under) test|test continu\w*|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)"
-    r"|un(?:ge|zer)broch\w*|disc(?= ?(?:\||$))|bruchfrei\w*|bruchlos\w*|uberleb\w*|im versuch|en cours"
-    r"|en essai|essai continu\w*|in corso|in prova|en curso|en ensayo|continua"
+    rf"run ?outs?|(?:failure|rupture|fracture) free|{_CENSORED}|unbroken|unfailed|unruptured|unfractured|discontinu\w+"
+    r"|surviv\w*|survecu\w*|running|on ?going|in progress|(?:in|on|under) test|test continu\w*"
+    r"|(?:durch)?lauf(?:er|end\w*|t(?: noch| weiter)?)|un(?:ge|zer)broch\w*|disc(?= ?(?:\||$))|bruchfrei\w*"
+    r"|bruchlos\w*|uberleb\w*|im versuch|en cours|en essai|essai continu\w*|in corso|in prova|en curso|en ensayo"
+    r"|continua|loopt(?: nog| door)*|nog bezig|lopend\w*|(?:uit|door)loper\w*|ongebroken|breukvrij\w*|gecensureerd\w*"
 )
 _INTERRUPTED = (
-    r"broken off|interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*"
-    r"|removed|withdrawn|unloaded|truncated|intact|active|gestoppt\w*"
-    r"|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch|abbruch|intakt\w*|arret\w*|stoppe\w*"
-    r"|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*"
-    r"|interrott\w*|interrumpid\w*|fermat\w*|detenid\w*|parad[ao]|smontat\w*|desmontad\w*|scaricat\w*|descargad\w*"
+    r"broken off|interr|aktiv\w*|intactes?|stopp?(?:ed|s)?|halted|aborted|interrupt\w*|removed|withdrawn|unloaded"
+    r"|truncated|intact|active|gestoppt\w*|abgebroch\w*|angehalten|ausgebaut\w*|entlastet\w*|unterbroch\w*|unterbruch"
+    r"|abbruch|intakt\w*|arret\w*|stoppe\w*|interromp\w*|interruption|demont\w*|decharg\w*|retire\w*|gestopt\w*"
+    r"|stopgezet\w*|onderbrok\w*|afgebrok\w*|verwijderd|uitgebouwd|uitgenomen|ontlast|interrott\w*|interrumpid\w*"
+    r"|fermat\w*|detenid\w*|parad[ao]|smontat\w*|desmontad\w*|scaricat\w*|descargad\w*"
 )
 _NOT = (
     r"no|not|non|none|never|without|(?:did|has|does|was|had|is|have)n ?t|yet to|nicht|kein\w*|ohne|nie|pas|sans|jamais"
-    r"|aucun\w*|nein|senza|sin|nessun\w*|ningun\w*|nunca"
+    r"|aucun\w*|nein|niet|geen|nooit|zonder|nee|senza|sin|nessun\w*|ningun\w*|nunca"
 )
 _FILLERS = (
     r"(?: (?:yet|a|any|been|be|has|have|the|specimen|sample|test|bar|probe|noch|der|die|den|de|d|la|l|le|ete|encore|est"
     r"|eprouvette|essai|creep|zum|es|ist|wurde|was|did|to|due|bis|jusqu|au|a|zu"
+    r"|nog|het|een|is|werd|prof|profstuk|profstaaf|staaf|tot"
     r"|si|e|stat[ao]|il|lo|provino|campione|ha|se|probeta|muestra|el|ancora|aun|todavia))*"
 )
 _NO_READING = "".join(f"(?<!{one} )" for one in ("reading", "value", "point", "frame", "messung", "messwert", "mesure"))
-_AHEAD = r"before|prior to|short of|vor|vor dem|avant|avant la|bevor|prima d(?:i|ella)|antes de(?: la)?"
+_AHEAD = (
+    r"before|prior to|short of|vor|vor dem|avant|avant la|bevor|prima d(?:i|ella)|antes de(?: la)?|voor(?:dat| de)?"
+)
 _EXPECTED = _words(
     r"before|prior|avant|vor|bevor|prima|antes|quasi|casi|could|would|might|may|should|konnte|pourrait|nearly|almost",
     rf"(?:near(?:ing)?|close to){_FILLERS} (?:{_RUPTURE})",
     r"imminent|expected|likely|will|soon|kurz vor|fast|still|noch|yet|encore|toujours|pending|outstanding|aus",
-    r"beinahe|erwartet|bald|wird|soll|presque|proche|prevue?|attendue?|bientot|if",
+    r"beinahe|erwartet|bald|wird|soll|presque|proche|prevue?|attendue?|bientot|if|bijna|voor|verwacht\w*|nog|zal",
 )
 _REACHED = (
     r"(?: (?:reached|attained|obtained|obtenue?|observed|occurred|seen|yet|noch|erreicht|eingetreten|aufgetreten"
-    r"|atteinte?|observee?|survenue?|occur|ein))*"
+    r"|atteinte?|observee?|survenue?|occur|ein|bereikt|opgetreden))*"
 )
 _UNBROKEN = re.compile(
     rf"(?<!\w)(?:(?:{_NOT}){_FILLERS} (?:{_RUPTURE})|{_NO_READING}(?:{_AHEAD}){_FILLERS} (?:{_RUPTURE})"
@@ -90,13 +92,14 @@ _NOT_INTERRUPTED = re.compile(
 )
 _ENDED = _words(
     r"ended|finished|complete[d]?|terminat\w*|beendet\w*|abgeschlossen|fertig|termine\w*|fini\w*|stop date",
-    r"concluid\w*|conclus\w*",
+    r"concluid\w*|conclus\w*|beeindigd|voltooid|afgelopen",
 )
 _DOUBTFUL = _words(
     r"unloading|removal|dismount\w*|cooling|reload\w*|restart\w*|ausbau|entlasten|abkuhlen|demontage|dechargement",
     r"furnace|oven|thermocouples?|tc|power|mains|grips?|machine|rig|heaters?|heating|controller|extensometer|lvdt",
     r"lever|pull rod|adapter|ofen|ofens|thermoelemente?s?|strom|stromausfall|netz|einspannung|maschine|heizung",
     r"regler|gestange|four|thermocouple|courant|regulation|extensometre|equipment|chauffage",
+    r"klem\w*|inspanning|stroom\w*|afkolen|ontlasten|thermokoppel",
     r"versuchsende|(?:after|nach|apres)(?: the| dem| l)? (?:tests?|end|versuch|essai)|by hand|von hand|a la main",
     r"(?:failure|rupture|fracture|breakage|bruch) (?:of the|de la|de l|der|des|du) (?!specimen|sample|test|bar|piece"
     r"|probe|prufling|eprouvette|ga[u]?ge|weld|partie|steel|alloy|material|werkstoff|stahl|alliage|acier|legierung)[a-z]+",
@@ -175,7 +178,7 @@ _INVALID = re.compile(
 _ELSEWHERE = re.compile(
     r"outside(?: of)?(?: the)? ga[u]?ge|out of ga[u]?ge|ausserhalb (?:der )?mess|hors (?:de )?(?:la )?(?:longueur|zone)"
     r"|(?:at|in|near) (?:the )?(?:grips?|shoulders?|fillets?|threads?)|grip failure"
-    r"|im (?:gewinde|kopf)|in der einspannung"
+    r"|im (?:gewinde|kopf)|in der einspannung|buiten (?:de )?meetlengte|in de (?:klem|draad|inspanning)"
 )
 
 
@@ -187,31 +190,11 @@ def invalidity_said_by(text: str) -> Literal["invalid", "elsewhere", ""]:
 
 YES = frozenset(
     (
-        "1",
-        "1.0",
-        "1,0",
-        "yes",
-        "y",
-        "si",
-        "sì",
-        "sí",
-        "ja",
-        "j",
-        "oui",
-        "o",
-        "true",
-        "wahr",
-        "vrai",
-        "t",
-        "x",
-        "*",
-        "+",
-        "✓",
-        "✔",
-        "✗",
+        *("1", "1.0", "1,0", "yes", "y", "si", "sì", "sí", "ja", "j", "oui", "o", "true", "wahr", "vrai", "t", "x"),
+        *("*", "+", "✓", "✔", "✗"),
     )
 )
-NO = frozenset(("0", "0.0", "0,0", "no", "n", "nein", "non", "false", "falsch", "faux"))
+NO = frozenset(("0", "0.0", "0,0", "no", "n", "nee", "nein", "non", "false", "falsch", "faux"))
 """Values of a column that says yes or no, in small letters."""
 
 
@@ -231,19 +214,21 @@ _CODES: Mapping[frozenset[str], Mapping[str, str]] = {
 _STATUS_WORDS = _words(
     r"status|statut|state|etat|zustand|result|resultat|ergebnis|outcome|ende|end|ended|ending|fin|issue",
     r"esito|stato|estado|risultato|resultado|termination|versuchsende|prufende|prufstatus|abbruchgrund|versuchsstatus|code|versuchsausgang|ausgang",
-    r"endart|motif|abschaltgrund|stoppgrund|endgrund|reason|grund",
+    r"resultaat|tostand|einde|uitkomst|reden|afloop|endart|motif|abschaltgrund|stoppgrund|endgrund|reason|grund",
 )
 _STATUS_FILLERS = _words(
     r"test|of|the|specimen|sample|final|de|l|d|essai|der|des|probe|versuch|prufung|reason|for|type|how|it|why",
-    r"della|prova|provino|del|ensayo|di|fine|grund|du|arret|eprouvette|versuchs|mode|art|end|at",
+    r"della|prova|provino|del|ensayo|di|fine|grund|du|arret|eprouvette|versuchs|mode|art|end|at|van|het|prof|profstuk",
 )
 _REMARK_WORDS = _words(
     r"remark|remarks|note|notes|comment|comments|bemerkung|bemerkungen|anmerkung|bem|anmerkungen|kommentar",
     r"kommentare|hinweis|hinweise|notiz|notizen|remarque|remarques|observation|observations|commentaire",
+    r"opmerking(?:en)?|notities?|tolichting|waarneming(?:en)?",
     r"nota|notas|osservazion[ei]|commento|commenti|observacion(?:es)?|comentarios?|annotazioni|commentaires|rem|anm|beobachtung|beobachtungen|meldung|meldungen|message|messages",
 )
 _OTHER_USES = _words(
     r"time|life|zeit|temps|duree|elongation|strain|dehnung|load|stress|hours|parameter|stunden|heures|location",
+    r"tijd|duur|rek|spanning|belasting|uur|uren|verlenging|plaats|locatie|positie|soort|snelheid|kruipsnelheid",
     r"tempo|tiempo|durata|duracion|vita|vida|ore|horas|carico|carga|sforzo|tensione?|deformazione|deformacion|velocita",
     r"velocidad|allungamento|alargamiento|posizione|posicion|zona|position|lage|mode|type|typ|ort|appearance|allongement|rate|(?:kriech)?(?:rate|geschwindigkeit)|vitesse",
 )
@@ -252,7 +237,7 @@ _OTHER_USES = _words(
 
 _DESCRIPTION = re.compile(
     rf"(?<!\w)(?:(?:{_RUPTURE}).* (?:location|position|mode|type|appearance|site)"
-    rf"|(?:location|mode|type|position|lieu|zone|site) .*(?:{_RUPTURE})"
+    rf"|(?:location|mode|type|position|lieu|zone|site|plaats|soort) .*(?:{_RUPTURE})"
     r"|bruch(?:lage|art|ort|stelle|form|typ|bild|flache))(?!\w)"
 )
 """Names of columns that say where or how a test broke, and are empty where it did not."""
@@ -277,6 +262,7 @@ _BEFORE_RUPTURE = _words(
     r"base|parent|found|ended|ends?|ran|on|due|time|h|hours?|days?|reached|steel|alloy|not|ist|wurde|war|hat|bis|zum|zu",
     r"nach|durch|mit|am|dann|endgultig\w*|prufling|probekorper|stab|werkstoff|vorzeitig\w*|est|ete|s|eprouvettes?|apres",
     r"provin[oi]|provett[ae]|campion[ei]|prova|probetas?|muestras?|ensayo|ha|hanno|se|si|e|stat[ao]|da|di|alla?|del(?:la)?",
+    r"na|uur|bij|en|prof|profstuk|profstaaf|staaf|monster|volledig\w*|taaie?|brosse?|materiaal|werd",
     r"dopo|ore|tras|despues|horas|con|regolare|normale|a|puis|par|jusqu|en|brutale?|nette|finale?|prematuree?|essai|metaux|duktiler|l",
 )
 """Words that stand before one of rupture where the specimen broke: any other is of what else did."""

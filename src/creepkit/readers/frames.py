@@ -18,7 +18,7 @@ from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column
 from creepkit.readers.questions import Question, collected, raise_all
 from creepkit.readers.table import CellTable, cells_of, some_of
 from creepkit.readers.vocabulary import HeaderVocabulary, NameTable, Terms, split_unit, split_written_name, unit_suffix
-from creepkit.records.quantities import FORCE, LENGTH, STRAIN, STRESS, TEMPERATURE, QuantityKind
+from creepkit.records.quantities import FORCE, LENGTH, RATE, STRAIN, STRESS, TEMPERATURE, TIME, QuantityKind
 
 _COMPRESSION = "magnitudes of negative stress and strain (compression)"
 NOISE_OF_ZERO = 0.01
@@ -58,8 +58,10 @@ class TableFrames:
     def line_of(self, label: str) -> Literal["", "earlier", "last"]:
         """Of which frame a label such as `line 17` is a remark."""
         line = int(label[5:]) if label.startswith("line ") and label[5:].isdecimal() else -1
-        last, lines = self.lines[-1], self.table.lines
-        return "last" if last <= line else "earlier" if lines[0] <= line < last else ""
+        first, last = int(self.table.lines[0]), int(self.lines[-1])
+        sign = -1 if last < first else 1  # of rows that were turned round
+        is_within = line >= 0 and sign * line >= sign * first
+        return "" if not is_within else "last" if sign * last <= sign * line else "earlier"
 
 
 def read_frames(
@@ -96,8 +98,10 @@ def read_frames(
     raise_all(errors)
     if "time" not in values:
         place, names = table.location(table.columns_line), table.written or table.columns
-        result = f"among {some_of(names)}" if names else "as every column is the same in all rows"
-        raise HistoryError(f"{place}: missing column: no time {result}; name one time_s, time_min or time_h")
+        if names:
+            raise head_question(table, names)
+        what = "missing column: no time as every column is the same in all rows; name one time_s, time_min or time_h"
+        raise HistoryError(f"{place}: {what}")
     if values["time"][0] > LATEST_START:  # s since 1970, days since 1900
         values["time"] = values["time"] - values["time"][0]
         notes.append("times since the first reading")
@@ -157,6 +161,9 @@ OF_UNIT: Mapping[str, QuantityKind] = {
 }
 """What a column without a name that is known may hold, by its unit."""
 
+_OF_HEAD = {"time": TIME, "minimum rate": RATE, **OF_UNIT}
+"""The same where no column is known."""
+
 
 UNUSED = "unused"
 """What an answer says of a column that stays unread."""
@@ -167,6 +174,22 @@ def column_question(table: CellTable, sentence: str, *choices: dict[str, str]) -
     place, kind = table.location(table.columns_line), table.header.get("label format")
     where = f"{place} ({kind.text})" if kind else place
     return Question(table.path, where, sentence, "columns", choices, is_free=True)
+
+
+def head_question(table: CellTable, names: Sequence[str]) -> Question:
+    """The question of what columns are of which none is a time, as in a language that is not known.
+
+    The likely answer is by their units: a table of stresses and temperatures without strains has one row a test.
+    """
+    units, found = {name: split_written_name(name)[1] for name in filter(None, names)}, dict[str, str]()
+    for name, suffix in ((name, unit_suffix(unit)) for name, unit in units.items()):
+        quantity = next((one for one, kind in _OF_HEAD.items() if suffix and suffix in kind.units), "")
+        found |= {name: quantity} if quantity not in ("", *found.values()) else {}
+    are_tests = {"stress", "temperature"} <= {*found.values()} and not {"strain", "elongation"} & {*found.values()}
+    likely = {name: f"{'rupture ' * (are_tests and one == 'time')}{one} ({units[name]})" for name, one in found.items()}
+    likely = likely if "time" in found.values() else {next(iter(units), "name"): "time_h", **likely}
+    what = f"missing column: no time among {some_of([*units])}; name one time_s, time_min or time_h in that row, behind"
+    return column_question(table, f"{what} its '#' where it has one, or say what they are", likely)
 
 
 def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_number
 from creepkit.files.labview import START
 from creepkit.readers.questions import Question
+from creepkit.readers.standard_names import oldest_first, with_clock_in_seconds
 from creepkit.readers.table import CellTable, SourceText, TableRow
 from creepkit.readers.table_heads import is_frame
 from creepkit.readers.table_layouts import TabulatedTest, tests_in
@@ -173,7 +174,7 @@ def _on_one_clock(
 def with_clocks_joined(found: Sequence[TabulatedTest], path: Path, vocabulary: HeaderVocabulary) -> list[TabulatedTest]:
     """The tests in one file; parts of one whose clock begins anew are joined, or tests of their own, as is said."""
     known, tests = vocabulary.terms(), list[list[TabulatedTest]]()
-    for test in found:
+    for test in (replace(one, table=_in_order(one.table, known)) for one in found):
         parts = [replace(test, table=replace(test.table, rows=rows)) for rows in _between_starts(test.table, known)]
         if tests and _may_go_on(tests[-1][-1], test, known):
             tests[-1] += parts
@@ -191,6 +192,17 @@ def with_clocks_joined(found: Sequence[TabulatedTest], path: Path, vocabulary: H
 
 def _numbered(test: TabulatedTest, number: int, parts: Sequence[TabulatedTest]) -> str:
     return f"{test.name or test.table.sheet or test.table.path.stem} ({number})" if len(parts) > 1 else test.name
+
+
+def _in_order(table: CellTable, known: Terms) -> CellTable:
+    """The table with its oldest row first, and with a clock h:mm:ss that begins anew in seconds."""
+    time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
+    table = table if time is None else with_clock_in_seconds(table, time)
+    if time is None or not all(is_number(row.cells[time], table.dialect) for row in table.rows):
+        return table
+    hours = [float_of(row.cells[time]) for row in table.rows]
+    is_turned = len(hours) > 2 and hours[-1] < hours[0] and all(b <= a for a, b in pairwise(hours))
+    return oldest_first(table) if is_turned else table
 
 
 _ANEW = 0.1

@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number, refuse_unprintable
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
-from creepkit.readers.columns_of_tests import column_called, head_of_tests
+from creepkit.readers.columns_of_tests import column_called, head_of_tests, side_by_side
 from creepkit.readers.frames import UNUSED, unknown_text
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.parts_of_tests import parts_beside
@@ -329,6 +329,8 @@ class SpreadsheetReader:
         sheets = [sheet for sheet in read_sheets(path) if sheet.sheet.casefold() not in left_out]
         framed = [sheet for sheet in sheets if holds_frames(sheet, self.vocabulary)]
         if not framed:
+            for sheet in filter(_has_readings, sheets):  # whose error says what its head lacks
+                tests_in(sheet, self.vocabulary)
             listed = ", ".join(f"'{sheet.sheet}'" for sheet in sheets) or "none that holds anything"
             raise HistoryError(f"{path}: no sheet has a column of time (sheets: {listed}); name one time_h or Time (h)")
         tests = [test for sheet in framed for test in tests_in(sheet, self.vocabulary)]
@@ -343,7 +345,7 @@ class SpreadsheetReader:
                 titles = _titles(sheet, self.vocabulary.terms())
                 tests = list(_with_conditions(sheet, tests, conditions, titles))
             else:  # remarks
-                aside.append(f"sheet '{sheet.sheet}' not read as it has no column of time")
+                aside.append(f"sheet '{sheet.sheet}' not read as it has no column of time above readings")
                 notes |= _note_of_sheet(sheet)
         tests = [replace(one, entries={**notes, **one.entries}, table=one.table.assuming(*aside)) for one in tests]
         return histories_of_tests(tests, path, self.vocabulary)
@@ -351,7 +353,13 @@ class SpreadsheetReader:
 
 def holds_frames(sheet: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether a sheet has a column of time above frames, and not one row a test."""
-    return names_time(sheet, vocabulary) and head_of_tests(sheet, vocabulary.synonyms) is None
+    is_framed = _has_readings(sheet) and names_time(sheet, vocabulary)
+    return is_framed and head_of_tests(side_by_side(sheet)[0], vocabulary.synonyms) is None
+
+
+def _has_readings(sheet: CellTable) -> bool:
+    """Whether numbers stand beside one another in a row, as not in a sheet of a diagram."""
+    return any(sum(cell[0].isdigit() for cell in row.cells if cell) > 1 for row in sheet.rows)
 
 
 def _agreement(key: str, test: TabulatedTest) -> int:

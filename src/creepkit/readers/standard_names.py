@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import Dialect, is_number
+from creepkit.files.delimited_text import Dialect, is_number, without_uncertainty
 from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve, through_midnight
 from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
@@ -106,7 +107,7 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
             moduli.append(replace(entry, text=f"{at} = {entry.text} {unit}".strip(), key=entry.key or key))
             continue
         found = split_unit(known.vocabulary.synonyms.get(key, name), known.conditions.kinds)
-        if found and (match := _VALUE_WITH_UNIT.fullmatch(entry.text)):
+        if found and (match := _VALUE_WITH_UNIT.fullmatch(without_uncertainty(entry.text))):
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
@@ -257,7 +258,7 @@ def with_elapsed_times(stated: dict[str, SourceText], table: CellTable, known: T
     elif _ELAPSED.fullmatch(cells[0]):
         seconds, assumption = _times_of(table, clock, known.vocabulary.synonyms)
     else:
-        seconds, assumption = _since_first_row(cells, table, order.text if order else "", zone.text if zone else "")
+        table, seconds, assumption = _of_stamps(table, clock, order.text if order else "", zone.text if zone else "")
     texts = [repr(float(time)).replace(".", table.dialect.decimal) for time in seconds]
     return table.renamed(columns).with_cells(clock, "time_s", texts).assuming(*filter(None, (assumption,)))
 
@@ -299,9 +300,42 @@ def _times_of(table: CellTable, clock: int, synonyms: Mapping[str, str]) -> tupl
     raise table.question(f"{what} 'Elapsed time ({form})' or 'Time of day'", "columns", *choices)
 
 
-def _since_first_row(cells: Sequence[str], table: CellTable, order: str, zone: str) -> tuple[Floats, str]:
+def _of_stamps(table: CellTable, clock: int, order: str, zone: str) -> tuple[CellTable, Floats, str]:
+    """The table, oldest row first, with (rows,) s of its time stamps and what was assumed of them."""
+    try:
+        return table, *_since_first_row(table, clock, order, zone)
+    except HistoryError as error:
+        with suppress(HistoryError):
+            if len(table.rows) > 2:  # of two one may have a wrong digit
+                return (turned := oldest_first(table)), *_since_first_row(turned, clock, order, zone)
+        raise error from None
+
+
+def oldest_first(table: CellTable) -> CellTable:
+    """A table whose newest row stands first, turned round."""
+    return replace(table, rows=table.rows[::-1]).assuming("rows turned round as the newest stands first")
+
+
+def with_clock_in_seconds(table: CellTable, clock: int) -> CellTable:
+    """The table with elapsed times h:mm:ss that begin anew, as behind a pause, in seconds; any other as it is.
+
+    A fall from an hour shortly before midnight may be one of the time of day.
+    """
+    name, cells = table.as_written(clock), list(cells_of(table.rows, clock))
+    pattern = _PATTERN.search(name)
+    is_of_hours = pattern is None or pattern[0].lower().startswith(("h:mm", "hh:mm"))
+    if not (is_of_hours and all(map(_ELAPSED.fullmatch, cells))) or words_of(split_written_name(name)[0]) in OF_DAY:
+        return table
+    seconds = _seconds_of(table, clock, _H_MM_SS[: cells[0].count(":") + 1])
+    before = seconds[:-1][np.diff(seconds) < 0.0]
+    is_elapsed = _ELAPSED_NAME.search(name) or ((before < 0.75 * DAY) | (before >= DAY)).all()
+    texts = [f"{one:.12g}".replace(".", table.dialect.decimal) for one in seconds]
+    return table.renamed(table.columns).with_cells(clock, "time_s", texts) if before.size and is_elapsed else table
+
+
+def _since_first_row(table: CellTable, clock: int, order: str, zone: str) -> tuple[Floats, str]:
     """(rows,) s of time stamps since that of the first row, and what was assumed of them."""
-    column = ClockColumn()
+    column, cells = ClockColumn(), list(cells_of(table.rows, clock))
     column.add(cells, [table.location(row.line) for row in table.rows])
     if -1 in column.rows[0]:
         k = int(np.argmax(column.rows[0] == -1))

@@ -34,6 +34,7 @@ from creepkit.files.delimited_text import (
     parse_number,
     parse_numbers,
     two_readings,
+    without_uncertainty,
 )
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.questions import Answer, Question
@@ -66,11 +67,11 @@ class SourceText:
         return self.text.casefold() == other.text.casefold() or (len(numbers) == 2 and numbers[0] == numbers[1])
 
     def number(self, name: str) -> float:
-        """The text as a finite number; `name` says in the error what it was meant to be."""
-        dialect = Dialect(decimal=self.decimal)
-        if self.decimal == "," and not is_number(self.text, dialect) and not POINT_OF_THOUSANDS.fullmatch(self.text):
+        """The text as a finite number, without its uncertainty; `name` says in the error what it was meant to be."""
+        dialect, text = Dialect(decimal=self.decimal), without_uncertainty(self.text)
+        if self.decimal == "," and not is_number(text, dialect) and not POINT_OF_THOUSANDS.fullmatch(text):
             dialect = Dialect()
-        return parse_number(self.text, dialect, self.location, name)
+        return parse_number(text, dialect, self.location, name)
 
 
 class TableRow(NamedTuple):
@@ -166,7 +167,7 @@ class CellTable:
     def numbers(self, name: str) -> Floats:
         """(rows,) One column as numbers."""
         k = self.column(name)
-        cells = list(cells_of(self.rows, k))
+        cells = [without_uncertainty(cell) for cell in cells_of(self.rows, k)]
         return parse_numbers(cells, self.dialect, lambda row: self.location(self.rows[row].line, k), self.as_written(k))
 
     @property

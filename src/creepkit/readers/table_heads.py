@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number
+from creepkit.files.delimited_text import NUMBERS, float_of, is_missing, is_number, without_uncertainty
 from creepkit.files.time_stamps import is_clock_time
 from creepkit.readers.ends_of_tests import end_said_by, invalidity_said_by
 from creepkit.readers.questions import Answer
@@ -103,7 +103,7 @@ def is_frame(row: TableRow, table: CellTable) -> bool:
     if all(map(NUMBERS[table.dialect.decimal].fullmatch, row.cells)):
         return True
     cells = [cell for cell in row.cells if cell]
-    numbers = [is_number(cell.rstrip("% "), table.dialect) or is_clock_time(cell) for cell in cells]
+    numbers = [is_number(without_uncertainty(c).rstrip("% "), table.dialect) or is_clock_time(c) for c in cells]
     return any(numbers) and all(one or is_missing(cell) for one, cell in zip(numbers, cells, strict=True))
 
 
@@ -120,7 +120,9 @@ def _row_of_names(table: CellTable, known: Terms) -> int:
         is_text = not any(is_number(cell, table.dialect) for cell in cells)
         if is_text and any(is_time(cell, known) for cell in cells) and (len(cells) > 1 or k == 0):
             return k
-    return next((k for k, row in enumerate(table.rows[1:_MOST_ROWS]) if is_frame(row, table)), 0)
+    above = next((k for k, row in enumerate(table.rows[1:_MOST_ROWS]) if is_frame(row, table)), 0)
+    is_of_units = above > 0 and all(map(unit_suffix, filter(None, table.rows[above].cells)))
+    return above - is_of_units
 
 
 def headed_table(table: CellTable, vocabulary: HeaderVocabulary) -> HeadedTable:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
 from creepkit.files.time_stamps import is_clock_time
-from creepkit.readers.frames import OF_UNIT, column_question, unknown_text
+from creepkit.readers.frames import OF_UNIT, column_question, head_question, unknown_text
 from creepkit.readers.names import NAMES_OF
 from creepkit.readers.remarks import rows_beside_notes, without_remarks, without_remarks_around
 from creepkit.readers.table import (
@@ -27,7 +27,6 @@ from creepkit.readers.table import (
     check_columns,
     grouped,
     named_columns,
-    some_of,
     with_columns,
     without_page_heads,
 )
@@ -466,8 +465,7 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
         what = f"{' and '.join(map(repr, axes[0]))} are columns of a plot; what are they?"
         raise column_question(headed.table, what, *choices)
     if not headed.times:
-        what = f"missing column: no time among {some_of(list(filter(None, headed.names)))}; name one time_s, time_min"
-        raise HistoryError(f"{headed.place}: {what} or time_h in that row, behind its '#' where it has one")
+        raise head_question(replace(headed.table, columns_line=headed.table.rows[0].line), headed.names)
     head = HeadOfTest(headed.table, headed.known)
     for row in headed.whole:
         head.read(row)

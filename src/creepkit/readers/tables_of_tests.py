@@ -14,7 +14,7 @@ from functools import partial
 from itertools import pairwise
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number
+from creepkit.files.delimited_text import Dialect, float_of, is_missing, is_number, without_uncertainty
 from creepkit.readers.columns_of_tests import (
     NAMES,
     QUANTITIES,
@@ -159,9 +159,10 @@ class TestTable:
         return ["" if k is None else row.cells[k] for row in self.rows]
 
     def name_of(self, row: TestRow) -> str:
-        """The name of its test: that of its cell, else the sheet or the file and the line."""
-        k = self.position("name")
-        return (k is not None and row.cells[k]) or f"{self.table.sheet or self.table.path.stem} {row.line}"
+        """The name of its test: that of its cell, else the sheet or the file, the line, and where the table begins."""
+        k, first = self.position("name"), self.table.positions[0]
+        beside = f" {self.table.location(row.line, 0).rpartition(', ')[2]}" * (first > 0)
+        return (k is not None and row.cells[k]) or f"{self.table.sheet or self.table.path.stem} {row.line}{beside}"
 
     def take_labels(self, other: CellTable) -> bool:
         """Take the columns of another sheet, such as compositions, by test, heat or alloy; whether a row has them."""
@@ -278,6 +279,11 @@ class TestTable:
             is_label = written in self.vocabulary.labels
             meant = synonyms.get(written) or synonyms.get(split_written_name(written)[0], written)
             column, cells = TestColumn() if is_label else column_called(meant), [row.cells[k] for row in self.rows]
+            if column.kind and (certain := [*map(without_uncertainty, cells)]) != cells:
+                self.table = self.table.assuming(f"uncertainties of '{quoted(written, 60)}' not used")
+                for row, cell in zip(self.rows, certain, strict=True):
+                    row.cells[k] = cell
+                cells = certain
             if column == TestColumn("rupture") and {cell.casefold() for cell in cells} <= {"", "-", *YES, *NO}:
                 column = TestColumn()
             if column.kind is TIME:

@@ -40,6 +40,7 @@ from creepkit.readers.columns_of_tests import (
     is_number_like,
     only_text,
     quantity_of,
+    side_by_side,
     stands_in_columns,
     unit_in,
 )
@@ -78,7 +79,8 @@ _ROUNDING = 0.01
 def tables_of(path: Path) -> list[CellTable]:
     """The cells of a text file, or of the sheets of a spreadsheet."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
-    return [one_row_a_test(one) for one in (read_sheets(path) if is_spreadsheet else [read_text_table(path)])]
+    tables = read_sheets(path) if is_spreadsheet else [read_text_table(path)]
+    return [one_row_a_test(one) for table in tables for one in side_by_side(table)]
 
 
 @dataclass(frozen=True)
@@ -97,18 +99,16 @@ class RowPerTestReader:
             return False
         if is_text:
             table = peek_table(path)
-            return table is not None and self._is_table(one_row_a_test(table))
+            return table is not None and self._is_table(table)
         try:
             sheets = read_sheets(path)
         except HistoryError:
             return False
-        return any(map(self._is_table, map(one_row_a_test, sheets))) and not any(
-            holds_frames(sheet, self.vocabulary) for sheet in sheets
-        )
+        return any(map(self._is_table, sheets)) and not any(holds_frames(sheet, self.vocabulary) for sheet in sheets)
 
     def _is_table(self, table: CellTable) -> bool:
-        names = self.vocabulary.synonyms
-        return head_of_tests(table, names) is not None or stands_in_columns(table, names)
+        names, first = self.vocabulary.synonyms, one_row_a_test(side_by_side(table)[0])
+        return head_of_tests(first, names) is not None or stands_in_columns(first, names)
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""

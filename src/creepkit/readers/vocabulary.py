@@ -203,11 +203,12 @@ class NameTable:
 
 _NUMBERING = (
     r"names?|ids?|no|nr|(?<!\w)n|num(?:ber|mer|[ée]ro)?|nom|code|label|bezeichnung|kennung|r[ée]f[ée]rence|identif\w+"
-    r"|sigla|codice|c[óo]digo"
+    r"|sigla|codice|c[óo]digo|naam"
 )
 _OF_TESTS = re.compile(
     rf"(?:(?:{_NUMBERING}) )*(?:tests?|test piece|samples?|specimens?|proben?|pr[uü]fling|versuchs?|essai|[ée]prouvette"
-    rf"|[ée]chantillon|rep[èe]re|provino|provetta|prova|campione|probeta|ensayo|muestra)(?: ?(?:{_NUMBERING}))*"
+    rf"|[ée]chantillon|rep[èe]re|provino|provetta|prova|campione|probeta|ensayo|muestra"
+    rf"|proef(?:stuk|staaf)?|monster|staaf)(?: ?(?:{_NUMBERING}))*"
 )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from creepkit.errors import HistoryError, quoted
+from creepkit.files.delimited_text import without_uncertainty
 from creepkit.readers.questions import ANSWERS_FILE
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_unit, unit_suffix
@@ -53,7 +54,7 @@ def conditions_of_head(cell: str, known: Terms) -> list[tuple[str, str]]:
 
     A load is a stress, where the file names no specimen that takes another one.
     """
-    text = " ".join(cell.split())
+    text = " ".join(without_uncertainty(cell).split())
     found = [(_quantity_of(match[2], known), f"{match[1]} {match[2]}") for match in _VALUE.finditer(text)]
     quantities = [quantity for quantity, _ in found]
     is_all = not _VALUE.sub("", text).strip(" ,;/|@()-–")
@@ -73,7 +74,7 @@ def conditions_in_text(text: str, place: str, known: Terms, *, is_name: bool = F
     [] for what is said of a heat treatment or of a strength, and for ranges such as `110 to 180 MPa`. is_name : whether
     it is the name of a file or sheet.
     """
-    found: dict[str, list[str]] = {}
+    found, text = dict[str, list[str]](), without_uncertainty(text)
     if _OF_THE_MATERIAL.search(text):
         return []
 

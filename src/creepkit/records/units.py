@@ -55,13 +55,14 @@ UNITS: Mapping[str, Unit] = MappingProxyType(
         "ns": _unit("time", 1e-9, "nanosecond", "nanoseconds"),
         "min": _unit("time", 60.0, "mins", "minute", "minutes", "minuten"),
         "h": _unit(
-            "time", 3600.0, "hr", "hrs", "hour", "hours", "std", "std.", "stunden", "heures", "heure", "ore", "horas"
+            *("time", 3600.0, "hr", "hrs", "hour", "hours", "std", "std.", "stunden", "heures", "heure", "ore"),
+            *("horas", "uur", "uren"),
         ),
         "kh": _unit(
             *("time", 3.6e6, "10^3 h", "10³ h", "10^3h", "10³h", "1e3 h", "1000 h", "1000h", "10**3 h"),
             *("1000 hr", "1000 hrs", "1000 hours", "10^3 hr", "10^3 hrs"),
         ),
-        "d": _unit("time", 86400.0, "day", "days", "tag", "tage", "jours", "jour", "giorni", "días", "dias"),
+        "d": _unit("time", 86400.0, "day", "days", "tag", "tage", "jours", "jour", "giorni", "días", "dias", "dagen"),
         "year": _unit("time", 31557600.0, "years"),
         "mm": _unit("length", 1.0, "millimetre", "millimeter"),
         "cm": _unit("length", 10.0, "centimetre", "centimeter"),

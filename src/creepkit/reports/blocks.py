@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 from markupsafe import Markup
 
-from creepkit.reports.words import ALL_DIGITS
+from creepkit.reports.words import ALL_DIGITS, OVER_ALL_TESTS
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
@@ -360,7 +360,10 @@ def _answer_lines(answer: Answer) -> list[str]:
 
     So do mean misfits, and then the intervals of values, where they would leave no room for one figure and one remark.
     """
-    figures = [f"{name}{at and ' at '}{at}: {value}{note and ', '}{note}" for name, at, value, note in answer.figures]
+    figures = [
+        f"{name}{at and (' ' if at.startswith(OVER_ALL_TESTS) else ' at ')}{at}: {value}{note and ', '}{note}"
+        for name, at, value, note in answer.figures
+    ]
     end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
     tests, _, misfits = answer.tests.partition("; ")

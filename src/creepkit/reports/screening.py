@@ -55,6 +55,7 @@ def plate_answer(
         cautions=[say(PLATE[kind], **values) for kind, many in told.items() if many],
         next_step=PLATE[f"next {following}"],
         picture=picture,
+        role="caution" * bool(rejecting),
     )
 
 

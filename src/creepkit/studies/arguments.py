@@ -117,9 +117,18 @@ def laws_of(file: StudyFile) -> list[CreepLaw]:
 
 def law_changes(file: StudyFile) -> LawChanges:
     """What is bounded and fixed of candidate laws, and their factor of temperature."""
-    part = file.model.identification
+    part, idle = file.model.identification, idle_fixes(file)
     with file.at("identification"):
-        return LawChanges().changed(values_of_table(LawChanges, part))
+        changes = LawChanges().changed(values_of_table(LawChanges, part))
+        return replace(changes, fix={name: value for name, value in changes.fix.items() if name not in idle})
+
+
+def idle_fixes(file: StudyFile) -> list[str]:
+    """Parameters fixed at 0 that registered laws have, and none of the study's: a law without one is that with 0."""
+    part = file.model.identification
+    zero = [] if part is None else [name for name, value in (part.fix or {}).items() if value == 0]
+    others = [name for name in zero if not any(name in ck.law(law).names for law in part.laws)] if part else []
+    return [name for name in others if any(name in law.names for law in ck.available("laws").values())]
 
 
 def isothermal_laws(changes: LawChanges, laws: Sequence[CreepLaw]) -> list[CreepLaw]:

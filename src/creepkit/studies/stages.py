@@ -191,7 +191,9 @@ def _identification_stage(study: StageInputs, group: TestGroup) -> Stage:
         "using": study.using_fingerprint,
         "tests": _digests(tests),
     }
-    return Stage("identification", group.name, described, make, Ranking, predictor=using)
+    idle = " and ".join(arguments.idle_fixes(study.file))
+    remark = f"fix {idle} = 0 holds of laws without {idle}, too: it changes none" if idle else ""
+    return Stage("identification", group.name, described, make, Ranking, predictor=using, remark=remark)
 
 
 def _temperature_stage(study: StageInputs, group: TestGroup) -> Stage:

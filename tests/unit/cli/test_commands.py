@@ -346,6 +346,22 @@ def test_without_a_terminal_each_question_is_a_line(tmp_path, capsys):
     assert 'tests.toml beside it: ["rates.csv"] ended = {B = "stopped", A = "ruptured"}' in lines[2]
 
 
+def test_a_modulus_that_nobody_stated_is_asked_for(tmp_path, capsys):
+    """Of a relaxation without its ramp, whether strain is a condition or a column; an answer makes it complete."""
+    head, stresses = "# temperature_C: 600\n", (180, 150, 120, 101, 92)
+    body = "".join(f"{t},{s}\n" for t, s in zip((0, 1, 10, 50, 100), stresses, strict=True))
+    held = body.replace("\n", ",0.15\n")
+    (tmp_path / "a.csv").write_text(f"# hold_strain_pct: 0.15\n{head}time_h,stress_MPa\n{body}", encoding="utf-8")
+    (tmp_path / "b.csv").write_text(f"{head}# control: strain\ntime_h,stress_MPa,strain_pct\n{held}", encoding="utf-8")
+    assert "question" in creepkit("read", tmp_path, "--ask").stderr
+    answer, left = typing("150", "160")
+    put_questions(partial(ck.read_histories, tmp_path), answer)
+    assert left == []
+    assert "how many GPa is it?" in capsys.readouterr().out
+    moduli = [test.elastic.at(873.15).E for test in ck.read_histories(tmp_path)]
+    assert sorted(moduli) == [150e3, 160e3]
+
+
 def test_a_specimen_and_lengths_that_nobody_stated_are_asked_for(tmp_path):
     head = "# pressure_MPa: 8\n# temperature_C: 800\ntime_s,amplitude_mm\n"
     (tmp_path / "d.csv").write_text(f"{head}60,0.08\n300,0.09\n900,0.1\n", encoding="utf-8")

@@ -51,7 +51,7 @@ def test_a_test_a_sheet_with_a_sheet_of_conditions(tmp_path: Path):
     first, second = read(workbook(tmp_path / "bars.xlsx", sheets))
     assert (first.name, second.name) == ("A1", "A2")
     assert (first.condition, second.condition, second.labels["heat"]) == ("850 °C, 60 MPa", "860 °C, 80 MPa", "X8")
-    assert "sheet 'Notes' not read as it has no column of time" in first.labels["assumed"]
+    assert "sheet 'Notes' not read as it has no column of time above readings" in first.labels["assumed"]
     sheets["Conditions"].append(["A3", 80, 860, "X8"])
     with pytest.raises(HistoryError, match="sheet 'Conditions', row 4: 'A3' has conditions, but no sheet or column"):
         read(workbook(tmp_path / "bars.xlsx", sheets))

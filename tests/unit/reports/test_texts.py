@@ -10,6 +10,7 @@ from creepkit.inverse.selection import rank
 from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.laws.norton import NORTON
 from creepkit.reports import words
+from creepkit.reports.blocks import Answer
 from creepkit.reports.wording import say
 from helpers.log_rate_predictor import known_scatter, measured
 
@@ -39,3 +40,13 @@ def test_a_part_of_a_text_stands_where_all_of_its_values_are_known() -> None:
     ) == ("0.0 of a and b, p = 0.02")
     assert say("as it is< of {names:and}><, {p:p}>", names=[], p=float("nan")) == "as it is"
     assert say("{text}", text="a < b > {c}") == "a < b > {c}"
+
+
+def test_a_figure_holds_at_a_condition_or_over_all_tests() -> None:
+    figures = [
+        ("stress exponent", "over all tests, 60–250 MPa", "9 [8, 10]", ""),
+        ("creep rate", "80 MPa", "2 %/h", ""),
+    ]
+    lines = str(Answer("norton", "27 tests", figures=figures)).splitlines()
+    assert "  stress exponent over all tests, 60–250 MPa: 9 [8, 10]" in lines
+    assert "  creep rate at 80 MPa: 2 %/h" in lines

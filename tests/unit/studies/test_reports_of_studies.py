@@ -289,6 +289,16 @@ def test_answers_beside_the_data_are_among_its_files(folder):
     assert {one.path.name for one in files} == {"table.csv", "other.csv", "tests.toml"}
 
 
+def test_what_is_fixed_at_zero_holds_of_laws_without_it(folder):
+    """As when the laws with damage are taken out of a proposed study; another number, or no law's name, is an error."""
+    assert identified(folder, 'laws = ["norton"]\nfix = { alpha = 0, m = 0 }').law.fingerprint
+    (stage,) = [one for one in ck.Study.load(folder / "study.toml").run().stages if one.kind == "identification"]
+    assert stage.sentence == "fix alpha and m = 0 holds of laws without alpha and m, too: it changes none"
+    for fixed in ("alpha = 0.5", "alhpa = 0"):
+        with pytest.raises(StudyError, match=f"no law has a parameter '{fixed[:5]}'"):
+            identified(folder, f'laws = ["norton"]\nfix = {{ {fixed} }}')
+
+
 def test_strengths_are_told_before_laws_are_identified(folder):
     path = folder / "study.toml"
     tables = '[identification]\nstarts = 1\nlaws = ["norton"]\n[temperature]\n[rupture]\ntimes_h = [10000]\n'
