@@ -230,10 +230,12 @@ inline void chain_stage_response(const StressControl& drive, const Segment& segm
         for (int64_t p = 0; p < count; ++p) {
             double total = by_parameter[p] + by_strain * work.base_change[p];
             total += by_beta * work.clock_change[p] + by_tau * work.clock_change[count + p];
-            if (work.offset != 0.0) total += answer[BY_TRIAL] * trial_by_offset * work.offset_change[p];
             for (int64_t z = 1; z < size; ++z) total += answer[INPUTS + z - 1] * work.base_change[z * count + p];
             if (v > 0) total -= work.base_change[v * count + p];
             result[p] = total / share;
+        }
+        for (int64_t p = 0; p < count && work.offset != 0.0; ++p) {
+            result[p] += answer[BY_TRIAL] * trial_by_offset * work.offset_change[p] / share;
         }
     }
 }
