@@ -31,8 +31,8 @@ SHOWN = {
     "Ranking": "headline=best.headline verdict decisive adequacy further failed challenges laws",
     "RankedLaw": "excess weight chi_square",
     "Registered": "",
-    "RuptureAssessment": "verdict decisive methods=ranked rejected relation strengths lives checks level=settings.level "
-    "notes provenance",
+    "RuptureAssessment": "verdict decisive methods=ranked rejected relation strengths lives checks "
+    "level=settings.level notes provenance",
     "RuptureFit": "method degree fixed log_likelihood scale_log10=scale scatter_log10=scatter effects_log10=effects",
     "ScreeningResult": "alloys=results law_fractions failures notes",
     "Specimen": "name title outputs nuisances",
