@@ -15,7 +15,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import CreepkitError
-from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy, Remedy
 from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import Perturbation
@@ -35,7 +35,8 @@ def whole_identification() -> ck.Identification:
     fit = ck.identify("norton", [h.replace(standard_deviation={"strain": 1e-6}) for h in tests], starts=1, **settings)
     adequacy = Adequacy(
         (OutputAdequacy("strain", 80, 2e-5, "estimated", 3.25, 1e-4, 3e-5),), 3.25, 78.0, 1e-4,
-        0.4, LargestDeviation("bar 1", "strain", 5400.0, -4e-5, 2.0), ("thickness", "offset of strain"),
+        0.4, LargestDeviation("bar 1", "strain", 5400.0, -4e-5, 2.0),
+        (Remedy("thickness", "an error of 0.01 mm in the thickness", is_usual=False), Remedy("offset", "an offset")),
         critical_chi_square=1.5, smallest_p_value=5e-5,
     )  # fmt: skip
     effects = (

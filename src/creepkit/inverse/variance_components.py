@@ -163,7 +163,10 @@ def log_noise_prior(noise_model: NoiseModel) -> float:
 
 
 def scaled_inverse(matrix: Floats) -> Floats:
-    """Inverses (..., n, n) of positive definite matrices (..., n, n) whose rows differ by orders of magnitude."""
+    """Inverses (..., n, n) of positive definite matrices whose rows differ by orders of magnitude.
+
+    matrix : (..., n, n).
+    """
     scale = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
     squares = scale[..., :, None] * scale[..., None, :]
     return np.asarray(np.linalg.inv(matrix / squares) / squares)

@@ -45,7 +45,10 @@ def doubtful_readings(history: History) -> Iterator[QualityFlag]:
 
 
 def gross_outlier(t: Floats, y: Floats) -> int | None:
-    """The one reading that makes an output fall that should grow, t, y : (readings,); None where there is none."""
+    """The one reading that makes an output fall that should grow; None where there is none.
+
+    t : (readings,) s. y : (readings,) the output.
+    """
     fall = _fall(y)
     either = [k for k in range(y.size) if _fall(np.delete(y, k)) <= LEFT * fall]
     if fall == 0.0 or not 0 < len(either) < 3:

@@ -199,7 +199,7 @@ def last_digits(values: Floats) -> Floats:
     """(values,) size of the last decimal digit in which each value is written, 0 where it is exact.
 
     Values that are written with fixed decimals share it, also where a constant was added to all of them; those with a
-    fixed number of digits have it by their size.
+    fixed number of digits have it by their size. values : (values,).
     """
     finite = values[np.isfinite(values)]
     if not finite.size or not np.abs(finite).max() > 0:

@@ -221,7 +221,11 @@ BASE = '[data]\nfiles = ["*.csv"]\n[identification]\nlaws = ["norton"]\n'
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_MPa = 5 }\n', 5, "end_h"),
         (BASE + '[[forecast]]\nname = "a"\nload = { stres_MPa = 5 }\nend_h = 1\n', 7, "did you mean 'stress_MPa'"),
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_C = 5 }\nend_h = 1\n', 7, "stress"),
-        (BASE + '[[forecast]]\nname = "a"\nload = { stress_MPa = -5 }\nend_h = 1\n', 7, "stress"),
+        (
+            BASE + '[[forecast]]\nname = "a"\nload = { pressure_MPa = -5 }\nmodulus_GPa = 150\nend_h = 1\n',
+            7,
+            "pressure",
+        ),
         (BASE + '[[forecast]]\nname = "a"\nload = { stress_MPa = [{ from_h = 1, level = 5 }] }\nend_h = 3\n', 7, "0"),
         (BASE + '[[forecast]]\nname = "a"\nload = { pressure_MPa = 5 }\nend_h = 1\n', 5, "modulus_GPa"),
         (BASE + '[[forecast]]\nname = "a"\ntests = ["*.csv"]\nend_h = 1\n', 8, "leave one of them out"),
