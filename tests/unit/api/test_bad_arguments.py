@@ -48,6 +48,13 @@ LONGEST = 5.0
 """s of processor time, of one call."""
 
 
+ONCE: dict[str, Callable[[], object]] = {
+    "train": lambda: importlib.import_module("torch"),
+    "interactive_page": lambda: ck.interactive_page("norton", "first.html"),  # trains the reduced-order model
+}
+"""What is done once on a machine or in a process, and takes longer than a call may."""
+
+
 NOT_CALLED = {
     "hookimpl": "pluggy's decorator",
     "Predictor": "a protocol",
@@ -190,8 +197,7 @@ def cases(name: str) -> Iterator[tuple[str, str, Callable[[], Any]]]:
 @pytest.mark.parametrize("name", _callables())
 def test_nothing_but_a_sentence_comes_out(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    if name == "train":
-        importlib.import_module("torch")  # which takes longer than a call may
+    ONCE.get(name, lambda: None)()
     wrong = []
     for argument, label, call in cases(name):
         try:
