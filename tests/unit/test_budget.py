@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7099,
     "records": 2470,
     "registry": 615,
-    "reports": 6688,
+    "reports": 6697,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_520
+TESTS = 31_539
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -347,7 +347,9 @@ def chosen_text(ranking: Ranking) -> str:
     others = f"; {plural(more, 'other')} below {LEAST_WEIGHT:g}" if more else ""
     weights = f"weights: {', '.join(known)}{others}"
     if len(known) == 1:
-        weights = f"weight {laws[0].weight:.2f} among {plural(len(laws), 'law')}"
+        same = len(ranking.laws) - len(laws)
+        become = f", {same} of which become it" if same else ""
+        weights = f"weight {laws[0].weight:.2f} among {plural(len(ranking.laws), 'law')}{become}"
     return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}"
 
 

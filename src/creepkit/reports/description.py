@@ -186,8 +186,9 @@ def tested_range(*fits: Identification) -> str:
 
 
 def tests_text(fit: Identification) -> str:
-    """How many tests until when."""
-    longest = fit.ranges["time"][1]
+    """How many tests until when; a test of which a minimum rate alone is known states no time."""
+    timed = [h.times[-1] for h in fit.histories if h.outputs or h.rupture_time is not None or h.unruptured]
+    longest = max(timed, default=0.0) if fit.histories else fit.ranges["time"][1]
     until = f" to {time_text(longest)}" if longest > 0.0 else ""
     return f"{plural(len(fit.tests), 'test')}{until}"
 

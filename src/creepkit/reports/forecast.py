@@ -21,7 +21,7 @@ from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end
 from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
 from creepkit.reports.load_programs import kind_of_test
-from creepkit.reports.prediction_bands import axis_label
+from creepkit.reports.prediction_bands import axis_label, is_compressed
 from creepkit.reports.wording import say
 from creepkit.reports.words import FORECAST
 
@@ -239,7 +239,7 @@ def _scaled(one: OutputForecast) -> float:
 
 def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
-    factor, logarithmic = _scaled(one), is_logarithmic(one.output)
+    factor, logarithmic = _scaled(one), is_logarithmic(one.output) and not is_compressed(test.history)
     positive = one.times > 0
     hours, band = one.times[positive] / SECONDS_PER_HOUR, one.band
     curve, low, high, lowest, highest = (
@@ -277,7 +277,8 @@ def _measured(test: TestForecast, output: str, factor: float) -> tuple[Floats, F
 def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, interval: str) -> None:
     """Intervals of times, the median marked: at the value that is reached, and of rupture at the upper edge."""
     right, (bottom, top) = axes.get_xlim()[1], axes.get_ylim()
-    edge = top * (bottom / top) ** BELOW_EDGE if is_logarithmic(one.output) else top - BELOW_EDGE * (top - bottom)
+    is_linear = axes.get_yscale() == "linear"
+    edge = top - BELOW_EDGE * (top - bottom) if is_linear else top * (bottom / top) ** BELOW_EDGE
     for time in test.times:
         is_rupture = not time.output
         level = edge if is_rupture else _scaled(one) * time.target

@@ -230,13 +230,14 @@ def _drawn_values(curve: TestCurve) -> Floats:
 def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> None:
     """Axes from the measured and identified values of what is drawn of an output."""
     values = np.concatenate([v for c in drawn for v in (c.measured, _drawn_values(c))])
-    largest = float(np.nanmax(values, initial=0.0))
-    if is_logarithmic(output) and largest > 0:
+    largest, logarithmic = float(np.nanmax(values, initial=0.0)), all(one.logarithmic for one in drawn)
+    if logarithmic and largest > 0:
         shown = values[values >= SHOWN_STRAIN_RATIO * largest]
         span(axes, "y", shown, 1.1 * largest, logarithmic=True, most=8)
     else:
         span(axes, "y", values, zero=True, most=8)
-    set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
+    hours = np.concatenate([c.hours for c in drawn])
+    set_time_range(axes, hours, logarithmic=logarithmic or output.startswith("stress"))
 
 
 # ---- tests one by one ------------------------------------------------------------------------------------------------

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from creepkit.inverse.identification import Identification
+    from creepkit.records import History
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +187,10 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     used = usable_frames(history, output)
     hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
     identified, half_width, growth = identified[used], half_width[used], growth[used]
-    if not is_logarithmic(output):
-        return TestCurve(hours, measured, identified, half_width, growth, measured - identified, logarithmic=False)
+    if not is_logarithmic(output) or is_compressed(history):
+        factor = 100.0 if is_logarithmic(output) else 1.0
+        drawn = (factor * one for one in (measured, identified, half_width, growth, measured - identified))
+        return TestCurve(hours, *drawn, logarithmic=False)
     offset = fit.tests[test][output].offset
     measured, identified = 100 * (measured - offset), 100 * (identified - offset)
     divisor = np.where(identified > 0, identified, np.nan)
@@ -195,6 +198,11 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     shown = np.where(measured > max(PLOTTED_STRAIN_RATIO * last, 0.0), measured, np.nan)
     half_width, slope, residuals = 100 * half_width / divisor, 100 * growth / divisor, 100 * np.log(shown / divisor)
     return TestCurve(hours, measured, divisor, half_width, slope, residuals, logarithmic=True)
+
+
+def is_compressed(history: History) -> bool:
+    """Whether a load is ever below zero, so that strains are not drawn over a logarithmic axis."""
+    return history.loading.quantity != "components" and bool(history.loading.program().values.min() < 0.0)
 
 
 def unit_of(output: str) -> str:
@@ -210,7 +218,6 @@ def axis_label(output: str) -> str:
     return f"{name}, {unit_of(output)}" if unit_of(output) else name
 
 
-def set_time_range(axes: Axes, hours: Floats, output: str) -> None:
+def set_time_range(axes: Axes, hours: Floats, *, logarithmic: bool) -> None:
     """Logarithmic where creep spans decades of time: strains, and stresses that relax. hours : (readings,)."""
-    logarithmic = is_logarithmic(output) or output.startswith("stress")
     set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from creepkit.forecasts.forecast import forecast
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.ranking import ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
@@ -19,9 +20,11 @@ from creepkit.kernels import lower
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Program, constant_stress
+from creepkit.records import History, Program, constant_stress, load_steps
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
+from creepkit.reports.forecast import forecast_figure
+from creepkit.reports.identification_plot import small_multiples
 from creepkit.reports.prediction_bands import curve_of_test, fitted_curves, joint_covariance
 from creepkit.reports.ranking import MOST_TESTS_DRAWN, misfit_name, misfits
 from creepkit.reports.rate_panels import own_rates
@@ -304,3 +307,22 @@ def test_each_hold_of_temperature_has_the_rate_at_that_temperature(stepped_fit):
     for celsius, stress, own in shown:
         by_law = float(stepped_fit.rate(stress, celsius + 273.15)[0])
         assert (stress, own / by_law) == pytest.approx((215.0, stepped_fit.tests[4].rate_factor))
+
+
+def test_a_bar_that_is_compressed_and_its_forecast_are_drawn_below_zero():
+    """Norton's bar at s, then at -s: strains r t, then r (2 h - t); the origin of time and of strain is on the axes."""
+    times = np.linspace(0.0, 3 * 3600.0, 46)[1:]
+    tests = [
+        History(
+            f"bar {s:g}", times, {"strain": 1e-7 * (s / 100.0) ** 5 * np.where(times < 3600, times, 7200 - times)},
+            load_steps("stress", [(0.0, s), (3600.0, -s)]), 900.0, standard_deviation={"strain": 1e-6},
+        )
+        for s in (90.0, 100.0)
+    ]  # fmt: skip
+    fit = identify(NORTON, tests, Uniaxial(), settings=IdentificationSettings(starts=1, sobol_points=8))
+    lowest = 100 * min(h.outputs["strain"].min() for h in tests)
+    for figure in (small_multiples(fit, [0, 1]), forecast_figure(forecast(fit, tests))):
+        drawn = [axes for axes in figure.axes if axes.get_ylabel().startswith("strain")]
+        assert drawn
+        assert all(axes.get_yscale() == axes.get_xscale() == "linear" for axes in drawn)
+        assert min(axes.get_ylim()[0] for axes in drawn) <= lowest

@@ -269,7 +269,7 @@ def _sections_of(
     if ranking is not None:
         none = ", none of which explains the tests" if rejected(fit) else f": weight {ranking.laws[0].weight:.2f}"
         blocks = ranking_blocks(ranking, figures if drawn else None, found.of)
-        said = f"best of {plural(sum(not one.same_as for one in ranking.laws), 'law')}{none}"
+        said = f"best of {plural(len(ranking.laws), 'law')}{none}"
         yield PageSection(f"{prefix}ranking", "Laws compared", blocks, result=said)
     scatter = f"rates of tests scatter by {scatter_text(fit.noise_model.rate)}"
     said = scatter if len(fit.tests) > 1 else "of the readings of one test"
