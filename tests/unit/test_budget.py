@@ -23,7 +23,7 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3328,
+    "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
     "files": 1308,

@@ -13,6 +13,7 @@ import io
 import re
 import tokenize
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, ClassVar
 
 from creepkit.exporters.fortran import fortran_number, fortran_statements
@@ -46,6 +47,17 @@ _MATHEMATICS = ("abs", "exp", "float", "log", "max", "min", "sqrt")
 Shape = Sequence[ast.expr]
 
 
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> tuple[dict[str, ast.FunctionDef], dict[str, ConstantValue], dict[int, str]]:
+    """The functions, constants and comments by line of an algorithm."""
+    tree = ast.parse(text)
+    stated = [node for node in tree.body if isinstance(node, ast.Assign)]
+    values = {ast.unparse(node.targets[0]): ast.literal_eval(node.value) for node in stated}
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
+    return {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}, values, comments
+
+
 class AlgorithmPrinter:
     """What both languages share: expressions, and the walk through statements.
 
@@ -60,14 +72,8 @@ class AlgorithmPrinter:
     element: ClassVar[tuple[str, str, str]]
 
     def __init__(self, text: str, constants: Mapping[str, ConstantValue], prefix: str) -> None:
-        tree = ast.parse(text)
-        self.prefix = prefix
-        self.functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-        stated = [node for node in tree.body if isinstance(node, ast.Assign)]
-        values = {ast.unparse(node.targets[0]): ast.literal_eval(node.value) for node in stated}
-        self.numbers: dict[str, ConstantValue] = {**values, **constants}
-        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-        self.comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
+        self.functions, values, self.comments = _parsed(text)
+        self.prefix, self.numbers = prefix, {**values, **constants}
         self.function = next(iter(self.functions.values()))
         self.used: dict[str, None] = {}
 
