@@ -189,8 +189,8 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     identified, half_width, growth = identified[used], half_width[used], growth[used]
     if not is_logarithmic(output) or is_compressed(history):
         factor = 100.0 if is_logarithmic(output) else 1.0
-        drawn = (factor * one for one in (measured, identified, half_width, growth, measured - identified))
-        return TestCurve(hours, *drawn, logarithmic=False)
+        measured, identified, half_width, growth = factor * np.stack([measured, identified, half_width, growth])
+        return TestCurve(hours, measured, identified, half_width, growth, measured - identified, logarithmic=False)
     offset = fit.tests[test][output].offset
     measured, identified = 100 * (measured - offset), 100 * (identified - offset)
     divisor = np.where(identified > 0, identified, np.nan)
