@@ -29,7 +29,7 @@ BUDGET = {
     "files": 1308,
     "forecasts": 1165,
     "instruments": 1159,
-    "integration": 790,
+    "integration": 792,
     "inverse": 9386,
     "jobs": 245,
     "kernels": 1689,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_539
+TESTS = 31_536
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -8,21 +8,10 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import creepkit as ck
-from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, principal_stress, states, stress
+from creepkit.language import CreepLaw, Param, mean_stress, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import Program, RecordedLoading, Status
-
-A, n, B, k, r = parameters("A n B k r")
-(omega,) = states("omega")
-RATE = Param("rate coefficient", bounds=(1e-40, 1e-3), unit="1/s", scale="log", off=0.0)
-POWER = Param("exponent", bounds=(1, 8))
-
-DAMAGE = CreepLaw(
-    name="damage",
-    terms={"power law": A * (stress / (1 - omega)) ** n},
-    params={A: RATE, n: POWER, B: RATE, k: POWER, r: POWER},
-    states={omega: State(0.0, B * stress**k / (1 - omega) ** r, limit=0.9)},
-)
+from helpers.kachanov_law import A, kachanov, n
 
 NORTON = {"A": 1e-14, "n": 4.0}
 E = 1.5e5
@@ -30,7 +19,7 @@ CASES = {
     "norton": (ck.law("norton"), NORTON),
     "strain hardening": (ck.law("strain-hardening"), {"A": 1e-17, "n": 4.0, "m": -0.6}),
     "sinh": (ck.law("hyperbolic-sine"), {"A": 1e-7, "n": 2.0, "B": 50.0}),
-    "damage": (DAMAGE, {"A": 1e-14, "n": 4.0, "B": 1e-13, "k": 4.0, "r": 3.0}),
+    "damage": (kachanov(stress, limit=0.9), {"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 4.0}),
 }
 CYCLES = RecordedLoading(
     Program(
@@ -95,9 +84,9 @@ def test_strain_hardening_goes_on_under_reversal():
 
 
 def test_compression_has_no_largest_principal_stress_and_a_mean_stress_below_zero():
-    law = CreepLaw(
-        "signs", {"term": A * (stress + 0.25 * principal_stress + 0.3 * mean_stress) ** n}, {A: RATE, n: POWER}
-    )
+    rate = A * (stress + 0.25 * principal_stress + 0.3 * mean_stress) ** n
+    coefficient = Param("rate coefficient", bounds=(1e-40, 1e-3), unit="1/s", scale="log")
+    law = CreepLaw("signs", {"term": rate}, {A: coefficient, n: Param("exponent", bounds=(1, 8))})
     steps = ck.StressSteps(((0.0, 100.0), (1000.0, -100.0)), control="stress")
     found = run(law, NORTON, steps, [1000.0, 2000])
     pulled, pressed = (NORTON["A"] * (100.0 * factor) ** 4 * 1000.0 for factor in (1.35, 0.9))

@@ -130,6 +130,8 @@ def integrate(
     jacobian : calculate derivatives too. keep_states : keep the internal variables at the output times.
     """
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
+    if theta.ndim > 2 and theta.shape[1:-1] != (len(tests),):
+        raise SolveError(f"parameters of shape {theta.shape} are not (candidates, {len(tests)} tests, parameters)")
     if sentence := refusal(law, theta):
         raise SolveError(sentence)
     result, inputs = _unfilled(theta, tests, jacobian), _inputs(law, theta, tests)

@@ -1,9 +1,8 @@
 """A bar in tension or compression, under steps of stress or load and of temperature, observed by its creep strain.
 
 Stress and strain are above zero in tension. Under constant load the true stress is the nominal one times exp(creep
-strain). An engineering strain is exp(creep
-strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are
-predicted too.
+strain). An engineering strain is exp(creep strain) - 1; a strain that includes the elastic part has stress/E(T) added.
+Times to given strains and to rupture are predicted too.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from creepkit.errors import SolveError
 from creepkit.integration import IntegrationSettings, PointTest, integrate
 from creepkit.integration.core_structures import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
 from creepkit.kernels import lower
@@ -34,6 +35,13 @@ def run(law, values, driving, times, stiffness=0.0, constant_load=False, **kwarg
     kernel = lower(law, "compiled")
     test = PointTest(driving, ROOM, np.asarray(times, float), stiffness, constant_load)
     return integrate(kernel, law.to_internal(values), [test], **kwargs)
+
+
+def test_values_of_another_number_of_tests_are_refused() -> None:
+    theta = np.tile(NORTON.to_internal({"A": 1e-14, "n": 4.0}), (1, 2, 1))
+    test = PointTest(Program.constant(100.0), ROOM, np.array([1.0]), 0.0, False)
+    with pytest.raises(SolveError, match=r"shape \(1, 2, 2\) are not \(candidates, 1 tests, parameters\)"):
+        integrate(lower(NORTON, "compiled"), theta, [test])
 
 
 def test_constant_load_bursts_when_the_closed_form_says() -> None:
