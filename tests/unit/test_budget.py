@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9386,
+    "inverse": 9387,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_536
+TESTS = 31_550
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -211,9 +211,10 @@ def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floa
     floor = observations.per_observation([one.floor if is_logarithmic(name) else np.inf for name, one in named])
     vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
     predicted = observations.inverse(vertical + problem.observations.transformed_values) + offset
-    above_floor = observations.present & (observations.values > 2 * floor)
-    measured = np.where(above_floor, observations.values, 1.0)
-    predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)
+    size, sign = np.abs(observations.values), np.sign(observations.values)
+    above_floor = observations.present & (size > 2 * floor)
+    measured = np.where(above_floor, size, 1.0)
+    predicted_strain = np.where(above_floor, np.maximum(predicted * sign, floor), 1.0)
     log_ratio = np.where(
         observations.followed_to_rupture[:, None],
         residuals.values + residuals.offset_sensitivity * offset,
