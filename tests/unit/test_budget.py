@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9387,
+    "inverse": 9394,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,
@@ -39,9 +39,9 @@ BUDGET = {
     "modules": 749,
     "quality": 1211,
     "readers": 7099,
-    "records": 2470,
+    "records": 2473,
     "registry": 615,
-    "reports": 6697,
+    "reports": 6726,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_550
+TESTS = 31_552
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

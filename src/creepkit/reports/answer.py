@@ -20,16 +20,16 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
 from creepkit.reports import words
+from creepkit.reports.advice import cautions, next_step
 from creepkit.reports.blocks import MOST_NAMED, Answer, Cell, Rich, Table, as_text, listed, number, plural, printable
-from creepkit.reports.cautions import cautions
 from creepkit.reports.description import headline_role, mean_misfit_text, tested_range, tests_text
-from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 from creepkit.reports.verdicts import same_functions, verdict_text
+from creepkit.reports.wording import shown_unit
 
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
@@ -210,7 +210,7 @@ def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
     """What the outputs of a test show at its end, or before it where they are predicted no longer."""
     for name, one in test.outputs.items():
         known = np.flatnonzero(np.isfinite(one.value))
-        unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
+        factor, unit = shown_unit(name)
         for k in known[-1:]:
             label = f"{name.replace('_', ' ')} at {time_text(float(one.times[k]))}"
             values = (one.value[k], one.band.low[k], one.band.high[k])

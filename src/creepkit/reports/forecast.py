@@ -18,11 +18,11 @@ from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
-from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
+from creepkit.reports.blocks import Answer, Block, Items, Table, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
-from creepkit.reports.load_programs import kind_of_test
+from creepkit.reports.histories import kind_of_test
 from creepkit.reports.prediction_bands import axis_label, is_compressed
-from creepkit.reports.wording import say
+from creepkit.reports.wording import say, shown_unit
 from creepkit.reports.words import FORECAST
 
 if TYPE_CHECKING:
@@ -38,11 +38,6 @@ if TYPE_CHECKING:
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
-
-
-def forecast_details(forecast: Forecast) -> str:
-    """The answer, with everything that is predicted of each test."""
-    return as_text(forecast_blocks(forecast))
 
 
 def forecast_answer(forecast: Forecast, picture: Block | None = None) -> Answer:
@@ -233,13 +228,9 @@ def _drawable(forecast: Forecast) -> list[TestForecast]:
     return tests
 
 
-def _scaled(one: OutputForecast) -> float:
-    return 100.0 if is_logarithmic(one.output) else 1.0
-
-
 def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
-    factor, logarithmic = _scaled(one), is_logarithmic(one.output) and not is_compressed(test.history)
+    factor, logarithmic = shown_unit(one.output)[0], is_logarithmic(one.output) and not is_compressed(test.history)
     positive = one.times > 0
     hours, band = one.times[positive] / SECONDS_PER_HOUR, one.band
     curve, low, high, lowest, highest = (
@@ -281,7 +272,7 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, interval: s
     edge = top - BELOW_EDGE * (top - bottom) if is_linear else top * (bottom / top) ** BELOW_EDGE
     for time in test.times:
         is_rupture = not time.output
-        level = edge if is_rupture else _scaled(one) * time.target
+        level = edge if is_rupture else shown_unit(one.output)[0] * time.target
         low, median, high, measured = (v / SECONDS_PER_HOUR for v in (time.low, time.median, time.high, time.measured))
         if time.output not in ("", one.output) or not bottom <= level <= top or not low <= right:
             continue

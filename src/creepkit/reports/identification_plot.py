@@ -22,9 +22,9 @@ from creepkit.reports.prediction_bands import (
     curve_of_test,
     fitted_curves,
     set_time_range,
-    unit_of,
 )
 from creepkit.reports.rate_panels import draw_rates, draw_ruptures, has_rates, rupture_rows
+from creepkit.reports.wording import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -312,7 +312,7 @@ def _draw_residuals(axes: Axes, fit: Identification, curve: TestCurve, output: s
     axes.axhline(0, color="black", lw=0.8)
     span(axes, "y", -limit, limit)
     axes.set_ylim(-limit, limit)
-    plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else unit_of(output)
+    plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else shown_unit(output)[1]
     axes.set_ylabel("noise sd" if judged else plain, fontsize=7)
 
 

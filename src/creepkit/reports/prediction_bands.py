@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,8 +17,10 @@ from creepkit.inverse.defect_correction import with_correction_at_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
-from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic
+from creepkit.reports.compared_values import once
 from creepkit.reports.figures import set_range
+from creepkit.reports.wording import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,18 +55,9 @@ BEFORE = 1e-4
 """Of a time: how much earlier a curve is predicted for its slope, which its frames do not show before a rupture."""
 
 
-_KNOWN_CURVES: WeakKeyDictionary[Identification, FittedCurves] = WeakKeyDictionary()
-"""Of identifications that are in use: the figures of one report draw the same curves."""
-
-
+@once
 def fitted_curves(fit: Identification) -> FittedCurves:
     """The curves of the fitted tests with their bands: one prediction with sensitivities, made once."""
-    if fit not in _KNOWN_CURVES:
-        _KNOWN_CURVES[fit] = _fitted_curves(fit)
-    return _KNOWN_CURVES[fit]
-
-
-def _fitted_curves(fit: Identification) -> FittedCurves:
     if fit.predictor is None or not fit.histories:
         raise FitError(
             "this identification was loaded without its histories: attach them with "
@@ -188,7 +180,7 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
     hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
     identified, half_width, growth = identified[used], half_width[used], growth[used]
     if not is_logarithmic(output) or is_compressed(history):
-        factor = 100.0 if is_logarithmic(output) else 1.0
+        factor = shown_unit(output)[0]
         measured, identified, half_width, growth = factor * np.stack([measured, identified, half_width, growth])
         return TestCurve(hours, measured, identified, half_width, growth, measured - identified, logarithmic=False)
     offset = fit.tests[test][output].offset
@@ -205,17 +197,9 @@ def is_compressed(history: History) -> bool:
     return history.loading.quantity != "components" and bool(history.loading.program().values.min() < 0.0)
 
 
-def unit_of(output: str) -> str:
-    """The unit in which an output is drawn."""
-    if is_logarithmic(output):
-        return "%"
-    return output_unit(output)
-
-
 def axis_label(output: str) -> str:
     """Name and unit of an output."""
-    name = output.replace("_", " ")
-    return f"{name}, {unit_of(output)}" if unit_of(output) else name
+    return ", ".join(filter(None, (output.replace("_", " "), shown_unit(output)[1])))
 
 
 def set_time_range(axes: Axes, hours: Floats, *, logarithmic: bool) -> None:

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
-from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of
+from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, ends, listed, plural, plural_of
 from creepkit.reports.condition_colours import ColourScale
 from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
 from creepkit.reports.words import RUPTURE
@@ -44,9 +44,9 @@ SHOWN_EFFECTS = 6
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_details(assessment: RuptureAssessment) -> str:
+def assessment_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
     """The verdict, then methods, strengths and checks, and the notes."""
-    return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
+    return [*strength_blocks(assessment), *rupture_blocks(assessment, figures, of)]
 
 
 def rupture_verdict(assessment: RuptureAssessment) -> str:

@@ -14,7 +14,7 @@ from creepkit.reports.blocks import Answer, Paragraph, as_text, ends, named, plu
 from creepkit.reports.description import NewTestInterval, rejected, tested_range
 from creepkit.reports.figures import empty_figure, place_legend
 from creepkit.reports.rate_panels import draw_plate, plate_rates, plate_size
-from creepkit.reports.remarks import numerical_error_text
+from creepkit.reports.verdicts import numerical_error_text
 from creepkit.reports.wording import say
 from creepkit.reports.words import PLATE
 from creepkit.screening.results import AlloyResult

@@ -117,7 +117,7 @@ NEXT = {
     # it cannot be judged
     "noise": "state the noise of the readings in a column {column}",
     # laws have weights of 0.05 or more, and bars can tell them apart
-    "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
+    "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor:.2g} times there",
     # bars cannot
     "separate otherwise": "make a test that tells {first} from {second} (creepkit design)",
     # the law above a threshold stress explains the tests as well, and bars can tell
@@ -125,17 +125,16 @@ NEXT = {
     # bars cannot
     "threshold otherwise": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
-    "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
+    "measure": "measure the {second} of the tests: one that nobody modelled would make another law the better",
     # what nobody modelled, of usual size, takes the rejection away; or the true stress held in place of the load
     "remedy": "find out whether there was {remedy}: the law would then explain the tests",
     # parameters are not determined, and a bar would do it
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     # a bar would not
     "determine otherwise": "make a test that determines {names} (creepkit design)",
-    # none of these
-    "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
-    # behind that, of bars
-    "narrow": "to narrow intervals, test at {stress} MPa, {celsius}, for {hours} h: a factor of {factor} there",
+    # none of these; bars may narrow intervals
+    "use": "forecast (creepkit predict), or export the law to your code (creepkit export)<; to narrow intervals, test "
+    "at {stress} MPa, {celsius}, for {hours} h: a factor of {factor:.2g} there>",
 }
 """{kind: what to do now}."""
 

@@ -59,7 +59,7 @@ class Correlation(Presentable):
                 raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
         return float(self.matrix[self.names.index(first), self.names.index(second)])
 
-    shown_by = "inference.correlation_text"
+    shown_by = "identification.correlation_text"
 
 
 @checked

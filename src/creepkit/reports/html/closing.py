@@ -23,8 +23,8 @@ from creepkit.reports.blocks import (
     sentence,
 )
 from creepkit.reports.compared_values import reading_counts, selection_sentence
+from creepkit.reports.contents import covariance_file
 from creepkit.reports.histories import history_blocks, quality_blocks
-from creepkit.reports.identified_files import covariance_file
 from creepkit.reports.law_names import definition_blocks
 from creepkit.reports.methods import laws_of, methods_text
 from creepkit.reports.verdicts import explanation_text

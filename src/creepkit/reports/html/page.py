@@ -45,7 +45,7 @@ from creepkit.reports.law_names import LawNames
 from creepkit.reports.prediction_bands import WIDEST
 from creepkit.reports.ranking import equivalents_among_remaining, ranking_blocks
 from creepkit.reports.rate_panels import plate_figure, rupture_rows
-from creepkit.reports.rupture import rupture_blocks, strength_blocks
+from creepkit.reports.rupture import assessment_blocks, rupture_blocks, strength_blocks
 from creepkit.reports.screening import plate_answer
 from creepkit.reports.svg import PageFigures
 from creepkit.reports.temperature_law import law_blocks, study_blocks
@@ -284,9 +284,7 @@ def _stage_sections(contents: ReportContents, figures: PageFigures, *, identifie
 
     Strengths stand among the findings where no law was identified, and are not repeated.
     """
-
-    def rupture(one: Any, figures: PageFigures, of: str) -> list[Block]:
-        return [*(strength_blocks(one) if identified else []), *rupture_blocks(one, figures, of)]
+    rupture = assessment_blocks if identified else rupture_blocks
 
     def trends(one: Any, *how: Any) -> list[Block]:
         return (law_blocks if isinstance(one, TemperatureLaw) else study_blocks)(one, *how)

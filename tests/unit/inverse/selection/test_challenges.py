@@ -29,7 +29,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, StressSteps, constant_stress
-from creepkit.reports.remarks import challenge_text
+from creepkit.reports.verdicts import challenge_text
 from helpers.planted_bars import BAR, END, SPL, M, N, bars
 from helpers.steady_rate_predictor import Steady, planted
 
