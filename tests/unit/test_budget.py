@@ -23,7 +23,7 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3331,
+    "exporters": 3332,
     "extraction": 1289,
     "fem": 1440,
     "files": 1308,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7099,
     "records": 2473,
     "registry": 615,
-    "reports": 6726,
+    "reports": 6693,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_552
+TESTS = 31_551
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -1,4 +1,4 @@
-"""What to mind of an identification, the most serious first: what keeps the law from the tests, and they from it."""
+"""What to mind of an identification, the most serious first, and what to do next: a law to try, or a test to make."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.nuisance_parameters import beyond_intervals
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
-from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, NOT_DETERMINED, POORLY_DETERMINED
+from creepkit.inverse.uncertainty.correlation import LOOSE
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text, time_text
@@ -154,10 +155,10 @@ def _choice(ranking: Ranking | None) -> Iterator[str]:
 def _precision(fit: Identification) -> Iterator[str]:
     """What the tests do not determine, and what intervals leave out."""
     by = "by this law the tests" if rejected(fit) else "the tests"
-    for verdict, kind in ((NOT_DETERMINED, "not determined"), (POORLY_DETERMINED, "hardly determined")):
-        names = [e.name for e in fit.estimates if e.verdict == verdict]
-        if names:
-            yield CAUTIONS[kind].format(by=by, names=named(names, "parameter"))
+    of = {verdict: [e.name for e in fit.estimates if e.verdict == verdict] for verdict in LOOSE}
+    names, others = (named(one, "parameter") * bool(one) for one in of.values())
+    if names or others:
+        yield say(CAUTIONS["not determined" if names else "hardly determined"], by=by, names=names, others=others)
     exponent = float(fit.local_exponent(fit.tested_point.stress, warn=False)[0])
     far = max(fit.left_out, key=lambda one: abs(one.exponent - exponent), default=None)
     if far is not None and not rejected(fit) and abs(far.exponent - exponent) > NOTEWORTHY_EXPONENT * exponent:
@@ -178,9 +179,12 @@ def _data(quality: DataQuality | None) -> Iterator[str]:
         yield CAUTIONS["suspect"].format(tests=named(tests, "test"))
 
 
+# ---- what to do next -------------------------------------------------------------------------------------------------
+
+
 def next_step(fit: Identification, ranking: Ranking | None = None, searched: Sequence[str] = ()) -> str:
     """What to do now, in one sentence without a full stop. searched : names of laws that a search of laws tried."""
-    adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in (NOT_DETERMINED, POORLY_DETERMINED)]
+    adequacy, weak = fit.adequacy, [e.name for e in fit.estimates if e.verdict in LOOSE]
     laws = [fit] if ranking is None else [one.fit for one in ranking.laws]
     in_tests = None if adequacy is None else adequacy.in_tests
     remedies = () if adequacy is None else adequacy.remedies

@@ -1,4 +1,4 @@
-"""What a report shows: one frozen record, of which every part is optional, and the small records that it is made of."""
+"""What a report shows: one frozen record, of which every part is optional, with the records and files that it holds."""
 
 from __future__ import annotations
 
@@ -213,6 +213,9 @@ def _freeze(record: object, *names: str) -> None:
     """Mappings of a frozen record that cannot be changed either."""
     for name in names:
         object.__setattr__(record, name, MappingProxyType(dict(getattr(record, name))))
+
+
+# ---- identifications as files ----------------------------------------------------------------------------------------
 
 
 def identified_files(rankings: Mapping[str, Ranking]) -> list[ExportedFile]:

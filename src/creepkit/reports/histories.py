@@ -1,4 +1,4 @@
-"""Measured tests as they were understood, and what is suspect in them: text, data, and every output over time."""
+"""Measured tests as they were understood, by their programs, what is suspect in them, and every output over time."""
 
 from __future__ import annotations
 
@@ -162,6 +162,8 @@ def _end_text(history: History) -> str:
 
 def quality_blocks(quality: DataQuality, most: int | None = None) -> list[Block]:
     """How many flags there are, and each; most : that are listed."""
+    if not quality.tests:
+        return [Paragraph("no test has readings to be checked")]
     if not quality.flags:
         return [Paragraph(f"nothing suspect in {plural(quality.tests, 'test')}")]
     head = f"{plural(len(quality.flags), 'flag')} in {plural(quality.tests, 'test')}; nothing was dropped"
@@ -205,6 +207,9 @@ def run_figure(run: Run) -> Figure:
     label = ", ".join(filter(None, (run.loading.quantity, load_unit(run))))
     panels[label] = [Course(run.reason and f"ended: {run.reason}", knots / SECONDS_PER_HOUR, program.at(knots))]
     return over_time(panels)
+
+
+# ---- load and temperature programs, "8 → 10 MPa at 4 h, 793 °C" ------------------------------------------------------
 
 
 MOST_HOLDS = 3

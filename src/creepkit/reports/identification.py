@@ -1,4 +1,4 @@
-"""What an identification says beyond its answer: values and verdict, tests, noise and nuisance parameters."""
+"""What an identification says beyond its answer: values and verdict, tests, noise, and texts of what follows it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ from creepkit.reports.compared_values import (
 from creepkit.reports.description import mean_misfit_text, rejected
 from creepkit.reports.identification_plot import residual_caption, small_multiples
 from creepkit.reports.methods import rate_scatter_sentence
-from creepkit.reports.rate_panels import rupture_rows
+from creepkit.reports.rate_panels import PERCENT_PER_HOUR, rupture_rows
 from creepkit.reports.verdicts import perturbation_text, remarks
 
 if TYPE_CHECKING:
@@ -251,13 +251,13 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else f"{number(first.offset, 2)}{unit}",
                 number(test.rate_factor, 3),
-                *_single_cells(None if first is not None else test.minimum_rate),
+                *_single_cells(None if first is not None else test.minimum_rate, 1.0 / PERCENT_PER_HOUR),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "minimum rate, 1/s", "by the law", "law / measured"),
+        *("rate × law", "minimum rate, %/h", "by the law, %/h", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
     caption = (
@@ -306,10 +306,10 @@ def _without_misfit(fit: Identification) -> list[str]:
     readings = judged_readings(fit)
     if readings is None:
         if not fit.histories or fit.predictor is None:
-            return ["χ² is not known: the tests were not given with this identification"]
-        return ["χ² is not known: nor is the noise of a reading, well enough to judge by"]
+            return ["no χ² is known: the tests were not given with this identification"]
+        return ["no χ² is known: the noise of a reading is not, well enough to judge by"]
     others = [t.name for k, t in enumerate(fit.tests) if t.outputs and not readings.mask(k).any()]
-    said = f"χ² is a dash where the noise of a reading is not known: {first_of(others, MOST_NAMED)}"
+    said = f"a dash stands for χ² where the noise of a reading is not known: {first_of(others, MOST_NAMED)}"
     return [said] if others else []
 
 
@@ -321,14 +321,14 @@ def logarithmic_output(fit: Identification) -> str:
 # ---- tests without curves --------------------------------------------------------------------------------------------
 
 
-def _single_cells(one: SingleValue | None, unit: float = 1.0) -> tuple[str, str, str]:
+def _single_cells(one: SingleValue | None, unit: float) -> tuple[str, str, str]:
     """What was measured, what the law predicts with its interval, and their ratio; unit : of the cells."""
     if one is None:
         return ("", "", "")
-    low, predicted, high, measured = (number(v / unit) for v in (one.low, one.predicted, one.high, one.measured))
+    low, predicted, high = (number(v / unit, 3) for v in (one.low, one.predicted, one.high))
     by_law = f"{predicted} [{low}, {high}]" if math.isfinite(one.predicted) else "none"
     known = math.isfinite(one.ratio) and not one.censored
-    return f"{'> ' * one.censored}{measured}", by_law, number(one.ratio, 3) if known else ""
+    return f"{'> ' * one.censored}{number(one.measured / unit)}", by_law, number(one.ratio, 3) if known else ""
 
 
 # ---- noise and nuisance parameters -----------------------------------------------------------------------------------
@@ -343,7 +343,8 @@ def noise_blocks(fit: Identification) -> list[Block]:
         squared = "–" if error is None else number(error.relative_squared_error, 3)
         sizes = {"of a reading": _judged_noise(fit, name), "in the fit": number(one.noise, 2)}
         sizes |= {"offset of a test": number(one.offset, 2), "rms misfit": rms, "squared error": squared}
-        rows.append({"output": name.replace("_", " "), "unit": output_unit(name) or "1", **sizes})
+        if {*sizes.values()} - {"–", "0"}:
+            rows.append({"output": name.replace("_", " "), "unit": output_unit(name) or "1", **sizes})
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if name := logarithmic_output(fit):
         part = fit.noise_model[name]
@@ -411,8 +412,8 @@ def _correlations(fit: Identification) -> list[Block]:
 
 def correlation_table(correlation: Correlation, caption: str = "") -> Table:
     """The matrix with its names."""
-    names = correlation.names
-    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
+    names, matrix = correlation.names, np.round(correlation.matrix, 3) + 0.0
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, matrix, strict=True)]
     return Table(caption, ("parameter", *names), rows)
 
 

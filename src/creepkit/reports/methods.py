@@ -204,40 +204,30 @@ def _estimation(fit: Identification, references: References) -> Iterator[str]:
         "noise": True,
         "likelihood": settings.weights == "likelihood",
         "weighted": settings.weights != "likelihood",
-        "nuisances": bool(kinds),
-        rate_scatter_kind(fit): True,
+        "nuisances": kinds,
+        "": True,  # on the scatter of rates
         "autocorrelated": True,
         "stated noise": any(one.stated > 0 for one in fit.noise_model.outputs.values()),
-        "numerical error": fit.numerical_error is not None,
+        "numerical error": fit.numerical_error,
     }
     values = {"starts": plural(settings.starts, "start"), "points": settings.sobol_points, "seed": settings.seed}
     values |= {"kinds": listed(kinds), "chance": AUTOCORRELATION_CONFIDENCE, "sd": NOISE_PRIOR_SD}
-    values |= scatter_values(fit)
-    yield from (references.said(kind, **values) for kind, true in holds.items() if true)
+    for kind in (kind for kind, true in holds.items() if true):
+        yield references.said(kind, **values) if kind else rate_scatter_sentence(fit)
 
 
 def rate_scatter_sentence(fit: Identification) -> str:
     """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
-    return References().said(rate_scatter_kind(fit), **scatter_values(fit))
-
-
-def scatter_values(fit: Identification) -> dict[str, Any]:
-    """What sentences on scatter hold."""
-    return {"scatter": 100 * fit.noise_model.rate, "tests": plural(len(fit.tests), "test")}
-
-
-def rate_scatter_kind(fit: Identification) -> str:
-    """Which of METHODS is said of the scatter of rates."""
     rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    return first_kind(
-        {
-            "no scatter": not rates,
-            "given scatter": any(one.sd is not None for one in rates[:1]),
-            "unknown scatter": len(fit.tests) < MINIMUM_TESTS,
-            "undetected scatter": fit.noise_model.rate <= UNDETECTED_SCATTER,
-            "scatter": True,
-        }
-    )
+    kinds = {
+        "no scatter": not rates,
+        "given scatter": any(one.sd is not None for one in rates[:1]),
+        "unknown scatter": len(fit.tests) < MINIMUM_TESTS,
+        "undetected scatter": fit.noise_model.rate <= UNDETECTED_SCATTER,
+        "scatter": True,
+    }
+    values = {"scatter": 100 * fit.noise_model.rate, "tests": plural(len(fit.tests), "test")}
+    return References().said(first_kind(kinds), **values)
 
 
 def _sparsity(found: ReportGroup, references: References) -> Iterator[str]:

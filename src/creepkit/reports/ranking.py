@@ -1,4 +1,4 @@
-"""What a ranking of laws says: the laws with misfits and weights, and what else the tests allow."""
+"""What a ranking or a search of laws says: the laws with misfits and weights, and what else the tests allow."""
 
 from __future__ import annotations
 
@@ -18,8 +18,13 @@ from creepkit.reports.condition_colours import distinct_colours, temperatures_ce
 from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
 from creepkit.reports.histories import program_text
-from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
-from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
+from creepkit.reports.identification_plot import (
+    FittedCurves,
+    curve_of_test,
+    draw_curve,
+    fitted_curves,
+    set_curve_ranges,
+)
 from creepkit.reports.terminal import print_table, tell, tell_written
 from creepkit.reports.verdicts import challenge_text, scatter_text, verdict_text
 from creepkit.reports.words import COMPARED
@@ -55,7 +60,7 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
         blocks.append(Paragraph(COMPARED["chi-square"], "note"))
     blocks.append(Items([*map(challenge_text, ranking.challenges or ())], "what the tests allow beside the best law:"))
     blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
-    if figures is not None and ranking.best.tests:
+    if figures is not None and np.isfinite(misfits(ranking)).any():
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
             f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
@@ -265,8 +270,11 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
     for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
     set_curve_ranges(axes, drawn, output)
-    axes.set(xlabel="time, h", ylabel=axis_label(output))
+    axes.set(xlabel="time, h", ylabel=drawn[0].label)
     axes.set_title(wrapped(f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}", 3.0), fontsize=8.5)
+
+
+# ---- search of laws --------------------------------------------------------------------------------------------------
 
 
 def law_search_text(search: LawSearch) -> str:

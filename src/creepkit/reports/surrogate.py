@@ -1,4 +1,4 @@
-"""Text and figures of surrogates: errors, training curves, parity (Fig. 4 of the paper), size study."""
+"""Text and figures of data sets and surrogates: errors, training curves, parity (Fig. 4 of the paper), size study."""
 
 from __future__ import annotations
 
@@ -120,6 +120,9 @@ def size_study_rows(trainings: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, 
         for one in results
     ]
     return (*heads, *(f"RSE {name}" for name in outputs)), rows
+
+
+# ---- data sets -------------------------------------------------------------------------------------------------------
 
 
 def dataset_text(data: Dataset) -> str:

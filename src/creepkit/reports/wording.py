@@ -30,9 +30,9 @@ def noises_text(noises: float) -> str:
 
 
 def odds_text(log_odds: float) -> str:
-    """Odds as a factor: "30 times"; log_odds : their ln."""
+    """Odds as "a factor of 30"; log_odds : their ln."""
     more = " or more" if log_odds > LARGEST_SHOWN_ODDS else ""
-    return f"{float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f} times{more}"
+    return f"a factor of {float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f}{more}"
 
 
 def shown_unit(output: str, specimen: str = "") -> tuple[float, str]:

@@ -138,7 +138,7 @@ def test_an_exponent_bent_to_the_shape_of_curves_is_contradicted_by_the_rates_of
     fit = ck.identify(ck.law("kachanov-rabotnov").times(ck.arrhenius(T_ref=1123.15)), tests, using=BAR)
     assert fit.adequacy.explanations[0].ends == pytest.approx((fit.values["n"], 6.0), abs=0.4)
     assert fit.headline.endswith("the tests reject it as exact")
-    assert "it is not exact: the stress exponent is 3.9 by the shape of the curves and 6" in cautions(fit)[0]
+    assert "it is not exact: the law's stress exponent is 3.9 by the shape of the curves and 6" in cautions(fit)[0]
     found = {e.name: e for e in fit.estimates}
     assert all(found[name].low < truth < found[name].high for name, truth in (("n", 6.0), ("Q", 480e3)))
 

@@ -16,8 +16,7 @@ from creepkit.reports.blocks import Block, Formula, Paragraph, Verbatim, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
 from creepkit.reports.histories import history_blocks, tests_figure
-from creepkit.reports.html.page import block_shown, findings_section, group_answer
-from creepkit.reports.html.templates import template
+from creepkit.reports.html.page import block_shown, findings_section, group_answer, template
 from creepkit.reports.law_names import LawNames, symbols_table
 from creepkit.reports.ranking import ranking_blocks
 from creepkit.reports.svg import PageFigures

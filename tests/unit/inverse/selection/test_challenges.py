@@ -153,7 +153,7 @@ def test_what_rests_on_a_furnace_that_nobody_watched_is_not_decisive():
     (drift,) = (c for c in found.challenges if c.kind == "unmodelled effect")
     assert drift.subject == "temperature drift"
     size = r"with independent drifts of the temperature of up to ([\d.]+) K over each of the 3 tests"
-    said = re.fullmatch(rf"{size} time-hardening would explain them \(weight 0\.\d\d\)", challenge_text(drift))
+    said = re.fullmatch(rf"{size} time-hardening would explain the tests \(weight 0\.\d\d\)", challenge_text(drift))
     assert 0.0 < float(said[1]) < 5.0
     assert challenge_text(drift) in found.verdict
 
