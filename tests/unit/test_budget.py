@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1211,
-    "readers": 7099,
+    "readers": 7236,
     "records": 2470,
     "registry": 615,
     "reports": 6697,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_536
+TESTS = 31_648
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
