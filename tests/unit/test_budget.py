@@ -26,7 +26,7 @@ BUDGET = {
     "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
-    "files": 1308,
+    "files": 1313,
     "forecasts": 1165,
     "instruments": 1159,
     "integration": 792,
@@ -37,8 +37,8 @@ BUDGET = {
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1211,
-    "readers": 7236,
+    "quality": 1217,
+    "readers": 7271,
     "records": 2470,
     "registry": 615,
     "reports": 6708,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_662
+TESTS = 31_707
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
