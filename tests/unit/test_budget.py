@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7236,
     "records": 2470,
     "registry": 615,
-    "reports": 6697,
+    "reports": 6708,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_648
+TESTS = 31_662
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
