@@ -31,7 +31,7 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
-from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.assembly import UNSAID_END, assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
     RATES,
     SAYS_RUPTURE,
@@ -191,7 +191,10 @@ class RowPerTestReader:
         if measure := _includes_elastic(table):
             entries.setdefault("includes_elastic", SourceText(measure, location))
         rows = [TableRow(row.line, (repr(time), repr(strain), "1")) for time, strain in frames]
-        if "end_time" in cells and cells["ended"].entry.text == STOPPED:  # after the last frame, with its strain
+        if "end_time" in cells and "ended" not in entries:
+            what = f"'{cells['end_time'].entry.key}' {UNSAID_END}"
+            raise sheet.question(what, "ended", RUPTURED, STOPPED, line=row.line)
+        if "end_time" in cells and entries["ended"].text == STOPPED:  # after the last frame, with its strain
             last = cells["end_time"].seconds()
             rows += [TableRow(row.line, (repr(last), repr(frames[-1][1]), "0"))] * (last > frames[-1][0])
         columns = ("time_s", "strain_1", "used")
