@@ -27,10 +27,10 @@ BUDGET = {
     "extraction": 1289,
     "fem": 1440,
     "files": 1308,
-    "forecasts": 1165,
+    "forecasts": 1184,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9386,
+    "inverse": 9459,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,
@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7099,
     "records": 2470,
     "registry": 615,
-    "reports": 6697,
+    "reports": 6699,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_536
+TESTS = 31_585
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
