@@ -30,7 +30,7 @@ BUDGET = {
     "forecasts": 1184,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9459,
+    "inverse": 9460,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,

@@ -188,7 +188,7 @@ class Judge:
             drift = self.predictor_errors.get(name, 0.0) / scale if scale else 0.0
             offset = self.noise_model[name].offset
             outputs[name] = OutputNoise(1.0, offset=offset, drift=drift, correlation_length=1.0)
-        return NoiseModel(outputs, self.noise_model.rate, self.noise_model.life)
+        return NoiseModel(outputs, self.noise_model.rate, life=self.noise_model.life)
 
     def _largest_deviation(self, judged: JudgedResiduals) -> LargestDeviation | None:
         """Where the deviation is largest over the known noise."""

@@ -181,9 +181,9 @@ class NoiseModel:
 
     outputs: Mapping[str, OutputNoise]
     rate: float = 0.0
-    life: float = 0.0
     discrepancy: float = 0.0
     discrepancy_length: float = 1.0
+    life: float = 0.0
 
     def __getitem__(self, output: str) -> OutputNoise:
         return self.outputs[output]

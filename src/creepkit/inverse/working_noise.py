@@ -64,8 +64,9 @@ INITIAL_SINGLE_VALUE_SD = 0.3
 """Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
 
-INITIAL_LIFE_SD = 0.1
-"""Scatter of ln of the rate of damage between tests to begin from, where curves are followed to rupture."""
+INITIAL_LIFE_SD = LARGEST_RATE_SCATTER
+"""Scatter of ln of the rate of damage between tests to begin from, where curves show it: what they share of their
+beginning is then that of rates."""
 
 
 UNRELATED_RATES = 0.95 * LARGEST_RATE_SCATTER
