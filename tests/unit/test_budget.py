@@ -26,7 +26,7 @@ BUDGET = {
     "exporters": 3331,
     "extraction": 1289,
     "fem": 1440,
-    "files": 1308,
+    "files": 1313,
     "forecasts": 1184,
     "instruments": 1159,
     "integration": 792,
@@ -37,11 +37,11 @@ BUDGET = {
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1211,
-    "readers": 7099,
+    "quality": 1217,
+    "readers": 7271,
     "records": 2470,
     "registry": 615,
-    "reports": 6699,
+    "reports": 6710,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_585
+TESTS = 31_756
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -224,7 +224,7 @@ def assemble_without_frames(
         end = _time_in_remark(conditions, said)
     if ended == RUPTURED and time is None and end is not None:
         time, end = end, None
-    if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
+    if rate_known and time is None and end is None and ended:  # when it ended is not known
         conditions.labels.setdefault("ended", ended)
         ended = ""
     _check_end_without_frames(time, end, ended, location)

@@ -277,10 +277,11 @@ def is_neutral(text: str) -> bool:
 def legend_in(text: str) -> dict[str, str]:
     """{sign or code: end} of `1 = failed, 0 = censored` or `* run-out`, as names of columns and notes explain them."""
     found: dict[str, str] = {}
+    text = re.sub(rf"(?i)^\s*(?:{_REMARK_WORDS.pattern})\s*:\s*", "", text)
     for sign, words in re.findall(r"(\(\)|\S{1,12}?)\s*(?:=|:|\N{EN DASH}|means|bedeutet)\s*([^,;()=]+)", text):
         if (said := end_said_by(words)) in (RUPTURED, STOPPED, INTERRUPTED):
             found[sign.strip("'\"([ ").casefold() or "()"] = RUPTURED if said == RUPTURED else STOPPED
-    marked = re.match(r"\s*([*+†‡#^]+|\(\))\)?\s*(.+)", text)
+    marked = re.match(r"\s*([*+†‡#^>]+|\(\))\)?\s*(.+)", text)
     if marked and (said := end_said_by(marked[2].lstrip("=: "))) in (RUPTURED, STOPPED, INTERRUPTED):
         found[marked[1]] = RUPTURED if said == RUPTURED else STOPPED
     return found

@@ -36,6 +36,7 @@ from creepkit.files.delimited_text import (
     two_readings,
     without_uncertainty,
 )
+from creepkit.files.time_stamps import DAYS
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.questions import Answer, Question
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
@@ -296,16 +297,22 @@ _IN_UNIT = re.compile(r"(?:(?:values )?(?:in|en) )?(.{1,8}?)(?:[,;.].*)?", re.IG
 
 
 def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
-    """The table without powers of ten, footnote marks, signs between thousands, and logarithms.
+    """The table without powers of ten, days before hours, footnote marks, signs between thousands, and logarithms.
 
     is_stated : whether the decimal sign is stated.
     """
     rows = list(table.rows)
     for k, row in enumerate(rows):
+        if any(":" in cell and DAYS.fullmatch(cell) for cell in row.cells):
+            rows[k] = row = TableRow(row.line, [DAYS.sub(_hours, cell) for cell in row.cells])
         if any("10" in cell and _POWER.search(cell) for cell in row.cells):
             rows[k] = TableRow(row.line, [_POWER.sub(_exponent, cell) for cell in row.cells])
     table = _without_footnotes(replace(table, rows=rows))
     return _without_logarithms(_without_thousands(table, is_stated=is_stated))
+
+
+def _hours(found: re.Match[str]) -> str:
+    return f"{24 * int(found[1]) + int(found[2])}{found[3]}"
 
 
 def _exponent(power: re.Match[str]) -> str:
