@@ -110,6 +110,7 @@ def _of_cause(one: Explanation) -> dict[str, Any]:
     if one.beside and factor < 1.0:
         factor, first, other = 1.0 / factor, other, first
     values = {"low": low, "high": high, "start": start, "end": end, "rises": "rises" if high > low else "falls"}
+    values |= {"size": abs(one.size), "faster": "faster" if one.size > 0 else "less fast"}
     return {"one": one, **values, "factor": factor, "first": first, "other": other, "near": [*one.near, ""][0]}
 
 

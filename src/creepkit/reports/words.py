@@ -330,6 +330,8 @@ CAUSES = {
     "stated groups": "{first} creeps {factor:.2g} times as fast as {other}",
     # curves and rates of tests disagree on the exponent
     "curves": "the {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests",
+    # curves and lives of tests disagree on how lives depend on stress
+    "life exponent": "lives of the tests fall {faster} with stress than the law's, by a power of {size:.2g}",
     # it changes more than the law lets it
     "stress exponent": "the stress exponent {rises} from {low:.2g} at {start:.4g} MPa to {high:.2g} at {end:.4g} MPa",
     # so does the energy
