@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_756
+TESTS = 31_805
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
