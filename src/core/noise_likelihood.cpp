@@ -259,14 +259,14 @@ struct LikelihoodMemory {
 
 // Whitens the values (observations, columns), in place: L^-1 y with C = L L', or, where `inverse`, C^-1 y.
 //
-// Observations as NoiseObservations has them; components : (5 outputs + 3,) see OutputComponent, SharedComponent.
+// Observations as NoiseObservations has them; components : (5 outputs + 4,) see OutputComponent, SharedComponent.
 // log_determinant : ln|C| over all tests. Returns 0; 1 where C is not positive definite, 2 without memory, 3 where
 // counts contradict each other.
 CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64_t effects, int64_t factors,
                                            const int64_t* starts, const int64_t* output, const double* loadings,
-                                           const double* test_weights, const double* components, int64_t columns,
-                                           int64_t inverse, double* values, double* log_determinant) {
-    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings, test_weights};
+                                           const double* components, int64_t columns, int64_t inverse, double* values,
+                                           double* log_determinant) {
+    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings};
     if (!has_valid_counts(observations) || columns < 0) return BAD_COUNT;
     const int64_t longest = longest_test(observations), most_states = observations.most_states();
     Workspace memory;
@@ -286,7 +286,6 @@ CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64
         const int64_t first = starts[t], n = starts[t + 1] - first;
         test.innovation = values + first * columns;
         if (!filter(observations, model, first, first + n, test, *log_determinant)) return NOT_POSITIVE_DEFINITE;
-        *log_determinant -= double(n) * log(test_weights[t]);
         if (inverse) {
             smooth(test, n, derivative);
             continue;
@@ -304,14 +303,14 @@ CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64
 //     (ln|C| + ln|A| + least of (y + X b)'C^-1 (y + X b) + (e + b)'P (e + b)) / 2,   A = X'C^-1 X + P;
 //
 // without unknowns b it is the plain one. values : (observations, 1 + unknowns) y and X. precision, prior_residual :
-// (unknowns,) the diagonal of P, and e. gradient : (5 outputs + 3,). The others, and what is returned, as above.
+// (unknowns,) the diagonal of P, and e. gradient : (5 outputs + 4,). The others, and what is returned, as above.
 CREEPKIT_API int64_t creepkit_restricted_likelihood(int64_t tests, int64_t outputs, int64_t effects,
                                                     int64_t factors, const int64_t* starts, const int64_t* output,
-                                                    const double* loadings, const double* test_weights,
-                                                    const double* components, int64_t unknowns, const double* values,
-                                                    const double* precision, const double* prior_residual,
+                                                    const double* loadings, const double* components,
+                                                    int64_t unknowns, const double* values, const double* precision,
+                                                    const double* prior_residual,
                                                     double* value, double* gradient) {
-    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings, test_weights};
+    const NoiseObservations observations{tests, outputs, effects, factors, starts, output, loadings};
     if (!has_valid_counts(observations) || unknowns < 0) return BAD_COUNT;
     const int64_t p = unknowns, width = p + 1;
     Workspace lists;
@@ -341,7 +340,6 @@ CREEPKIT_API int64_t creepkit_restricted_likelihood(int64_t tests, int64_t outpu
         for (int64_t i = 0; i < n; ++i)
             for (int64_t c = 0; c < C; ++c) test.innovation[i * C + c] = values[(starts[t] + i) * width + own[c]];
         if (!filter(observations, model, starts[t], starts[t + 1], test, log_determinant)) return NOT_POSITIVE_DEFINITE;
-        log_determinant -= double(n) * log(test_weights[t]);
         for (int64_t i = 0; i < n; ++i) {
             const double* v = test.innovation + i * C;
             for (int64_t c = 1; c < C; ++c) {

@@ -2,11 +2,11 @@
 //
 // An observation i of output o has the error
 //
-//     drift_o x1(t_i) + D u_i x2(t_i) + offset_o s_i x3 + rate d_i x4 + sum_k e_ik x_k + white noise of variance W_i,
+//     drift_o x1(t_i) + D u_i x2(t_i) + offset_o s_i x3 + rate d_i x4 + life b_i x5 + sum_k e_ik x_k + white noise of W_i,
 //     W_i = (noise_o w_i)^2 + misfit_o^2 + jitter,
 //
 // where all x have unit variance. x1 and x2 are Ornstein-Uhlenbeck processes with correlation exp(-lag / length), drawn
-// anew for each output, as is the offset x3; x4 and the random effects x_k are one for the whole test. Each is a state
+// anew for each output, as is the offset x3; x4, x5 and the random effects x_k are one for the whole test. Each is a state
 // of the model, with the transition phi = exp(-lag / length) (1: constant, 0: drawn anew) and the variance 1 - phi^2 of
 // what the transition adds. White noise of one output may be correlated with that of others in the same frame: it is then
 //
@@ -31,30 +31,28 @@ namespace creepkit {
 constexpr double ABSOLUTE_JITTER = 1e-10, RELATIVE_JITTER = 1e-9;
 
 // Columns of what is known of an observation: lag to the previous one of its output (negative: it is the first), w, s,
-// u, d, then e; where there are factors, whether the observation is the first of its frame (1 or 0), then l.
-enum Loading { LAG, WHITE_LOADING, OFFSET_LOADING, DISCREPANCY_LOADING, RATE_LOADING, FIRST_EFFECT };
+// u, d, b, then e; where there are factors, whether the observation is the first of its frame (1 or 0), then l.
+enum Loading { LAG, WHITE_LOADING, OFFSET_LOADING, DISCREPANCY_LOADING, RATE_LOADING, LIFE_LOADING, FIRST_EFFECT };
 
 // Components of one output; behind those of all outputs the shared ones.
 enum OutputComponent { NOISE, MISFIT, OFFSET, DRIFT, CORRELATION_LENGTH, OUTPUT_COMPONENTS };
-enum SharedComponent { RATE, DISCREPANCY, DISCREPANCY_LENGTH, SHARED_COMPONENTS };
+enum SharedComponent { RATE, LIFE, DISCREPANCY, DISCREPANCY_LENGTH, SHARED_COMPONENTS };
 
 // Observations of all tests, those of a test by output and in order of time, or with factors by frame.
 //
 // starts : (tests + 1,) first observation of each test. output : (observations,) position of its output. loadings :
-// (observations, 5 + effects), with factors (observations, 6 + effects + factors), see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; it
-// is used for the determinant only, values are given times the root of it.
+// (observations, 6 + effects), with factors (observations, 7 + effects + factors), see Loading.
 struct NoiseObservations {
     int64_t tests, outputs, effects, factors;
     const int64_t* starts;
     const int64_t* output;
     const double* loadings;
-    const double* test_weights;
 
     int64_t count() const { return starts[tests]; }
     int64_t first_of_frame() const { return FIRST_EFFECT + effects; }
     int64_t columns() const { return first_of_frame() + (factors > 0 ? 1 + factors : 0); }
     const double* of(int64_t observation) const { return loadings + observation * columns(); }
-    int64_t most_states() const { return (factors > 0 ? 3 * outputs : 3) + 1 + effects + factors; }
+    int64_t most_states() const { return (factors > 0 ? 3 * outputs : 3) + 2 + effects + factors; }
 };
 
 // One state: positions of its size and of its correlation length among the components, of those of an output where
@@ -88,6 +86,7 @@ public:
             if (offsets) states[count++] = {OFFSET, -1, OFFSET_LOADING, true, own};
         }
         if (components[shared + RATE] > 0.0) states[count++] = {shared + RATE, -1, RATE_LOADING, false};
+        if (components[shared + LIFE] > 0.0) states[count++] = {shared + LIFE, -1, LIFE_LOADING, false};
         for (int64_t k = 0; k < observations.effects; ++k) states[count++] = {-1, -1, FIRST_EFFECT + k, false};
         for (int64_t k = 0; k < observations.factors; ++k)
             states[count++] = {NOISE, -1, observations.first_of_frame() + 1 + k, true, -1, true};

@@ -138,7 +138,7 @@ def law_only_of(case: Case, fit: Identification, history: History, output: str) 
     draws = law_draws(fit, DRAWS, rng)
     centre = {d.kind: d.mean for d in uncertain_quantities(fit, history, predictor, {})}
     fixed = {kind: np.full((DRAWS, 1), value) for kind, value in centre.items()}
-    drawn = SimulatedTest(fit, predictor, history, centre).drawn(draws.u, np.zeros(DRAWS), fixed)
+    drawn = SimulatedTest(fit, predictor, history, centre).drawn(draws.u, np.zeros((2, DRAWS)), fixed)
     values = drawn.of(output, history.times)
     ordered = np.sort(np.where(np.isfinite(values), values, np.inf), axis=0)
     low, high = (ordered[int(p * DRAWS)] for p in (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))

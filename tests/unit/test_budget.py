@@ -26,22 +26,22 @@ BUDGET = {
     "exporters": 3332,
     "extraction": 1289,
     "fem": 1440,
-    "files": 1308,
-    "forecasts": 1165,
+    "files": 1313,
+    "forecasts": 1184,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9394,
+    "inverse": 9468,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1211,
-    "readers": 7099,
+    "quality": 1217,
+    "readers": 7346,
     "records": 2473,
     "registry": 615,
-    "reports": 6693,
+    "reports": 6706,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_551
+TESTS = 31_820
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -11,6 +11,7 @@ import creepkit as ck
 from creepkit.language import CreepLaw, Param, mean_stress, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import Program, RecordedLoading, Status
+from creepkit.studies.proposal import DataSummary
 from helpers.kachanov_law import A, kachanov, n
 
 NORTON = {"A": 1e-14, "n": 4.0}
@@ -176,6 +177,8 @@ def test_planted_values_are_found_in_reversed_tests_within_their_intervals():
         assert fit.adequacy.explains
         inside += sum(e.low <= values[e.name] <= e.high for e in fit.estimates)
     assert inside >= 7
+    assert "±64–154 MPa" in fit.headline
+    assert "12 levels of load, -140 to 154 MPa" in DataSummary.of(tests).lines[0]
 
 
 def test_pressed_bars_have_the_law_of_the_same_bars_pulled():

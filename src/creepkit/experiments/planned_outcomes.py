@@ -32,7 +32,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
-from creepkit.inverse.perturbations import LIFE, RATE, errors_of_tests, with_derivatives_to_lengths
+from creepkit.inverse.perturbations import RATE, errors_of_tests, with_derivatives_to_lengths
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_condition
 from creepkit.inverse.residuals import candidate_residuals
@@ -206,7 +206,7 @@ class UsualErrors(NamedTuple):
     ) -> UsualErrors:  # fmt: skip
         """Those that intervals include, of some tests among others; of a ranking of laws lengths of each test alone."""
         errors = [e for e in errors_of_tests(problem, linear, noise_model, among) if e.included]
-        own = [e.residual_change for e in errors if not e.common and not (of_ranking and e.kind in (RATE, LIFE))]
+        own = [e.residual_change for e in errors if not e.common and not (of_ranking and e.kind == RATE)]
         return cls(own, {e.kind: e.residual_change for e in errors if e.common and not of_ranking})
 
 
@@ -362,7 +362,7 @@ class PlannedOutcomes:
         observations = self._observations(chunk)
         known = self.laws[0].noise_model  # the same for all; the derivatives are those of each law
         outputs = {name: known[name] for name in observations.outputs}
-        noise_model = NoiseModel(outputs, known.rate, known.discrepancy, known.discrepancy_length)
+        noise_model = replace(known, outputs=outputs)
         predicted = [_predicted(law, chunk, observations, noise_model) for law in self.laws]
         factors = [CovarianceFactor.of_residuals(one.residuals, noise_model) for one in predicted[: self.candidates]]
         if len(chunk) == 1:

@@ -28,6 +28,12 @@ _STAMP = re.compile(
 _DATE = re.compile(r"(\d{1,4})([-./ ])(\d{1,2}|[A-Za-z]{3,9})\.?([-./ ])(\d{1,4})", re.ASCII)
 
 
+DAYS = re.compile(
+    r"(\d{1,5})(?:\.(?=\d\d:\d\d:)| ?(?:d|days?|tage?),? ?)(\d{1,2})((?::\d\d){1,2}(?:[.,]\d+)?)", re.IGNORECASE
+)
+"""An elapsed time of days and hours, as `1.02:30:00` and `1 day, 2:30:00`."""
+
+
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
@@ -66,9 +72,10 @@ class ClockColumn:
 
 
 def is_clock_time(text: str) -> bool:
-    """Whether a cell is a time of day, a date with one, or a date."""
+    """Whether a cell is a time of day, a date with one, a date, or an elapsed time with days."""
     match = _STAMP.fullmatch(text) if 0 < len(text) < 60 else None
-    return match is not None and (match["hour"] is not None or match["date"] is not None)
+    is_stamp = match is not None and (match["hour"] is not None or match["date"] is not None)
+    return is_stamp or (":" in text and DAYS.fullmatch(text) is not None)
 
 
 def _parsed(match: re.Match[str]) -> tuple[float, float] | None:

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.stats import norm
 
 from creepkit.arrays import Bools, Floats
-from creepkit.forecasts.draws import DrawnLaw
+from creepkit.forecasts.draws import LIFE_SCATTER, DrawnLaw
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import OutputNoise, known_sd
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, RELATIVE_DISCREPANCY_UNIT
@@ -338,6 +338,7 @@ class BandedOutput:
         by_joint[:, : one.draws.fit.u.size] = slope[:, None] * of.coordinates[:, column]
         by_joint[:, [*scatter.new_test(self.history).known.values()]] = rate[:, None]
         variances = {source: rate**2 * variance for source, variance in one.own_variances.items()}
+        variances[LIFE_SCATTER] = (slope * of.life[:, column] * one.draws.fit.noise_model.life) ** 2
         for dimension in one.dimensions:
             change = slope * of.dimensions[dimension.kind][:, column]
             if dimension.shared is None:

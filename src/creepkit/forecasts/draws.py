@@ -54,6 +54,10 @@ SOURCES = {
 """What the scatter of each level is called among the parts of a band."""
 
 
+LIFE_SCATTER = "scatter of lives beside rates"
+"""Among the parts of a band."""
+
+
 MISFIT_THERE = "what the law misses at this stress and temperature"
 """Among the parts of a band."""
 
@@ -304,8 +308,8 @@ class TestCurves:
 class TestSensitivities:
     """Derivatives of the outputs of a test at the identified values, in the output's unit.
 
-    outputs : names. coordinates : (times, outputs, parameters) to u. rate : (times, outputs) to ln of a factor on its
-    rate. dimensions : {kind: (times, outputs)}.
+    outputs : names. coordinates : (times, outputs, parameters) to u. rate, life : (times, outputs) to ln of a factor on
+    its rate, and on its rate of damage alone. dimensions : {kind: (times, outputs)}.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -313,6 +317,7 @@ class TestSensitivities:
     outputs: tuple[str, ...]
     coordinates: Floats
     rate: Floats
+    life: Floats
     dimensions: Mapping[str, Floats]
 
 
@@ -376,14 +381,15 @@ class SimulatedTest:
             return self.own.for_search()
         return (cheaper if {*self.centre} <= {*cheaper.nuisances} else self.own).for_search()
 
-    def drawn(self, u: Floats, log_factor: Floats, nuisances: Mapping[str, Floats]) -> TestCurves:
+    def drawn(self, u: Floats, log_factors: Floats, nuisances: Mapping[str, Floats]) -> TestCurves:
         """The curves of draws, through a cheaper predictor moved by its difference from the exact one at the values.
 
-        u : (draws, parameters) coordinates. log_factor : (draws,) ln of a factor on every rate. nuisances : {kind:
-        (draws, 1)}.
+        u : (draws, parameters) coordinates. log_factors : (2, draws) ln of a factor on every rate, and on that of
+        damage beside it. nuisances : {kind: (draws, 1)}.
         """
         theta = np.clip(self.fit.coordinates.theta(u), *self.fit.law.internal_bounds)
-        drawn, (exact, numerical) = self._curves(self._cheaper, theta, log_factor, nuisances), self.central
+        theta[:, [*self.fit.coordinates.damage_rates]] += log_factors[1][:, None]
+        drawn, (exact, numerical) = self._curves(self._cheaper, theta, log_factors[0], nuisances), self.central
         if self._cheaper is self.own and not numerical:
             return drawn
         at_values = self._at_values(self._cheaper)
@@ -405,7 +411,8 @@ class SimulatedTest:
             for kind, values in prediction.nuisance_jacobian.items()
         }
         to_u = jacobian[..., :size] @ self.fit.coordinates.jacobian(self.fit.u)
-        return TestSensitivities(prediction.outputs, to_u, jacobian[..., moved].sum(axis=-1), slopes)
+        rate, life = (jacobian[..., [*k]].sum(axis=-1) for k in (moved, self.fit.coordinates.damage_rates))
+        return TestSensitivities(prediction.outputs, to_u, rate, life, slopes)
 
     @property
     def _fixed(self) -> dict[str, Floats]:
@@ -482,7 +489,8 @@ def drawn_law(
     simulated = SimulatedTest(fit, predictor, history, {d.kind: d.mean for d in dimensions}, known)
     central, numerical = simulated.central
     factors = log_factor_draws(draws, test, rng)
-    drawn = simulated.drawn(draws.u, factors, dimension_draws(dimensions, draws, rng))
+    lives = fit.noise_model.life * rng.standard_normal(draws.count)
+    drawn = simulated.drawn(draws.u, np.stack([factors, lives]), dimension_draws(dimensions, draws, rng))
     solved = ~np.isnan(drawn.end_times)
     if solved.mean() < LEAST_SOLVED:
         raise FitError(

@@ -20,7 +20,15 @@ from creepkit.forecasts.banded_output import (
     BandedOutput,
     OutputForecast,
 )
-from creepkit.forecasts.draws import DrawnLaw, LawDraws, crossing_times, drawn_law, first_crossing, has_sampled_draws
+from creepkit.forecasts.draws import (
+    LIFE_SCATTER,
+    DrawnLaw,
+    LawDraws,
+    crossing_times,
+    drawn_law,
+    first_crossing,
+    has_sampled_draws,
+)
 from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text, outside_combinations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
@@ -197,10 +205,10 @@ def _times(
         made = _time_forecast(event, value, np.concatenate(crossings), history, level, measured, censored=False)
         forecasts.append(replace(made, output=name, target=float(target)))
     ends = np.concatenate([one.drawn.end_times for one in laws])
-    ruptures = best.draws.fit.noise_model.outputs.get(RUPTURE_OUTPUT)
-    if ruptures is not None:
-        ends = ends * np.exp(ruptures.misfit * rng.standard_normal(ends.size))
-    asked = history.end_known or ruptures is not None or RUPTURE_OUTPUT in targets
+    noise = best.draws.fit.noise_model
+    noise = replace(noise, life=0.0) if best.draws.fit.coordinates.damage_rates else noise  # which the draws have
+    ends = ends * np.exp(noise.scatter_of_value(RUPTURE_OUTPUT) * rng.standard_normal(ends.size))
+    asked = history.end_known or RUPTURE_OUTPUT in noise.outputs or RUPTURE_OUTPUT in targets
     if np.isfinite(ends).any() and (asked or (ends <= history.times[-1]).mean() > NOTEWORTHY_CHANCE):
         measured = history.rupture_time or (float(history.times[-1]) if history.unruptured else float("nan"))
         value = float(best.central.end_times[0])
@@ -257,6 +265,8 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
     for source, variance in best.own_variances.items():
         if variance > 0:
             sizes[source].append(f"{100 * np.sqrt(variance):.2g} % of the rate")
+    if fit.noise_model.life > NEGLIGIBLE_LIFE:
+        sizes[LIFE_SCATTER].append(f"{100 * fit.noise_model.life:.2g} % of the life")
     for dimension in best.dimensions:
         unit = "mm" if is_length_nuisance(dimension.kind) else UNITS.get(dimension.kind, "")
         sizes[dimension.kind].append(f"{dimension.mean:.4g} ± {dimension.sd:.2g} {unit}".strip())
@@ -268,6 +278,10 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
         if known.misfit > 0 or fit.noise_model.discrepancy > 0:
             sizes[MISFIT] = ["what the fitted tests showed beside the law"]
     return {part: ", ".join(texts) for part, texts in sizes.items()}
+
+
+NEGLIGIBLE_LIFE = 1e-3
+"""Scatter of ln of lives beside rates of which nothing is said."""
 
 
 FAR = 100.0

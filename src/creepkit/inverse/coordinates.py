@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import sympy
@@ -13,9 +14,9 @@ from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import ArrayKernel, lower, tension_point
-from creepkit.language import CreepLaw, stress, temperature
+from creepkit.language import CreepLaw, strain, stress, temperature
 from creepkit.language.law_record import expression_size
-from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.language.symbols import POINT_VARIABLES, State
 
 SAMPLE_POINTS = 64
 """Points within the bounds at which the derivative to a candidate parameter is evaluated."""
@@ -143,14 +144,17 @@ class Coordinates:
         """Parameters whose place the local exponent of their term takes."""
         self.term_rates = tuple(k for k, _, _ in self._rate_kernels)
         """Positions of the coordinates that are log rates of terms."""
-        for rate_law in _state_rate_laws(law):
+        damage = list[int]()
+        for state, rate_law in _state_rate_laws(law):
             position = _coefficient_position(law, rate_law)
             kernel = lower(rate_law, "numpy")
             positions = [law.names.index(n) for n in rate_law.names]
             if position is not None and position not in self.term_rates and self._has_finite_rate(kernel, rate_law):
                 self._rate_kernels.append((position, positions, kernel))
+                damage += [position] if state.limit is not None else []
         self.state_rates = tuple(k for k, _, _ in self._rate_kernels if k not in self.term_rates)
         """Positions of the coordinates that are log rates of internal variables."""
+        self._of_damage = tuple(damage)
 
     @property
     def penalised(self) -> tuple[int, ...]:
@@ -161,6 +165,15 @@ class Coordinates:
     def coefficients(self) -> tuple[int, ...]:
         """Positions of the coordinates that are log rates of terms and of internal variables."""
         return self.term_rates + self.state_rates
+
+    @cached_property
+    def damage_rates(self) -> tuple[int, ...]:
+        """Positions of the internal parameters that are logarithms of how fast damage grows, if there are any.
+
+        Those of internal variables that end the life of a material point; in a law without such, the exponents by which
+        its rate grows with strain.
+        """
+        return self._of_damage or tuple(self.names.index(p.name) for p in _accelerations(self.law))
 
     @property
     def every_rate_has_coefficient(self) -> bool:
@@ -255,8 +268,19 @@ class Coordinates:
         return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)
 
 
-def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
-    """A law for each internal variable, its rate being how fast that one moves; none where that has no logarithm.
+def _accelerations(law: CreepLaw) -> list[sympy.Symbol]:
+    """Parameters p of a logarithmic scale by which a rate is exponential in strain: d ln rate / d strain is p > 0."""
+    found = list[sympy.Symbol]()
+    for term in law.terms.values():
+        slope = sympy.diff(sympy.expand_log(sympy.log(term), force=True), strain)
+        if slope != 0 and not slope.has(strain) and slope.subs(dict.fromkeys(slope.free_symbols, 1)) > 0:
+            multiplying = (p for p, param in law.params.items() if slope.has(p) and param.scale == "log")
+            found += [p for p in multiplying if not (slope / p).cancel().has(p)]
+    return found
+
+
+def _state_rate_laws(law: CreepLaw) -> list[tuple[State, CreepLaw]]:
+    """Internal variables, each with a law whose rate is how fast that one moves; none where that has no logarithm.
 
     Only the coefficient's coordinate depends on it: without it, the coefficient is a coordinate itself.
     """
@@ -268,7 +292,7 @@ def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
             replace(law, terms={term_name: sign * state.rate}, params=state_parameters, constraints=())
             for sign in (1, -1)
         )
-        rate_laws += list(filter(_has_log_form, signed_rate_laws))[:1]
+        rate_laws += [(state, one) for one in filter(_has_log_form, signed_rate_laws)][:1]
     return rate_laws
 
 

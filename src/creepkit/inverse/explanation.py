@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.records.presentable import Presentable
 
-Kind = Literal["stress exponent", "activation energy", "one test", "two groups"]
+Kind = Literal["stress exponent", "activation energy", "life exponent", "one test", "two groups"]
 
 
 MENTIONED_ODDS, VERDICT_ODDS = float(np.log(6.0)), float(np.log(50.0))
@@ -25,8 +25,8 @@ class Explanation(Presentable):
 
     kind : what changes. tests : names of the tests that it concerns; of two groups those of the smaller.
     size, sd : of ln of the factor on their rates, or what the stress exponent, or the activation energy in J/mol,
-        changes by over the tests, and its standard deviation. odds : ln of the odds against the law as it is; 0 of a
-        test that stands out and is no explanation.
+        changes by over the tests, or by how much the exponent of their lives is larger than the law's, and its standard
+        deviation. odds : ln of the odds against the law as it is; 0 of a test that stands out and is no explanation.
     ends : the exponent at the lowest and the highest stress, or the energy in J/mol at the lowest and the highest
         temperature; at : these stresses, MPa, or temperatures, K. Where both are one, ends are the exponent by the
         shape of curves and by the rates of tests.
@@ -57,7 +57,7 @@ class Explanation(Presentable):
     @property
     def is_of_law(self) -> bool:
         """Whether it is the law that misses what the tests show."""
-        return self.kind in ("stress exponent", "activation energy")
+        return self.kind in ("stress exponent", "activation energy", "life exponent")
 
     @property
     def is_of_curves(self) -> bool:

@@ -12,6 +12,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.checked_arguments import checked
 from creepkit.errors import FitError, quoted
 from creepkit.inverse.composite_predictor import compared_outputs
+from creepkit.inverse.noise_covariance import RandomEffects
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import noise_standard_deviation, usable_frames
@@ -113,7 +114,8 @@ class TestFit:
     frames : how many values count (strains above twice the floor of their transform, all frames of other outputs).
     log_strain_rms, log_strain_bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted
         strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.residuals).
-    rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
+    rate_factor, life_factor : estimated factors of this test's creep rate on the law's (heat-to-heat scatter), and of
+        its rate of damage beside it, by which its life is shorter.
     rupture : its end, where that is known and predicted. minimum_rate : of a test without frames, where it is stated.
     """
 
@@ -125,6 +127,7 @@ class TestFit:
     log_strain_rms: float
     log_strain_bias: float
     rate_factor: float = 1.0
+    life_factor: float = 1.0
     outputs: tuple[OutputFit, ...] = ()
     rupture: SingleValue | None = None
     minimum_rate: SingleValue | None = None
@@ -150,14 +153,13 @@ class TestFit:
 def test_fits(
     problem: LeastSquaresProblem,
     residuals: Residuals,
-    random_effects: tuple[Floats, Floats],
+    random_effects: RandomEffects,
     histories: Sequence[History],
     prediction: Prediction,
     single_values: Sequence[tuple[SingleValue | None, SingleValue | None]],
 ) -> tuple[TestFit, ...]:
     """One TestFit for each test.
 
-    random_effects : offsets (tests, outputs) in the output's unit, and ln rate factors (tests,).
     histories, prediction : with all frames; single_values : end and minimum rate of each of them.
     """
     offsets, log_factors = random_effects
@@ -184,7 +186,8 @@ def test_fits(
                 test_ratios.size + linear,
                 rms,
                 bias,
-                float(np.exp(log_factors[k])),
+                float(np.exp(log_factors[0, k])),
+                float(np.exp(log_factors[1, k])),
                 tuple(outputs),
                 *single_values[k],
             )

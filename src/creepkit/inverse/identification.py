@@ -219,7 +219,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
             problem = problem.with_nuisances(replace(nuisances, sd=prior_sd))
         if self.numerical_error is not None:
             problem, _ = correct_defect(problem, self.x)
-        log_factors = np.log([m.rate_factor for m in self.tests])
+        log_factors = np.log([(one.rate_factor, one.life_factor) for one in self.tests]).T
         if self.settings.weights == "likelihood" and np.abs(log_factors).max() > NOTEWORTHY_FACTOR:
             problem = problem.about_rates(self.x, log_factors)
         problem = problem.about_stopped_tests(self.x, self.noise_model)

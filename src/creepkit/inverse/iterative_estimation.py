@@ -236,7 +236,7 @@ def _about_predicted_rates(
     problem: LeastSquaresProblem, x: Floats, residuals: Residuals, noise: NoiseModel
 ) -> LeastSquaresProblem:
     """The problem at x (unknowns,) about the rates of tests that residuals show; as it is where these are its own."""
-    log_factors = np.clip(predicted_random_effects(residuals, noise)[1], -LARGEST_FACTOR, LARGEST_FACTOR)
+    log_factors = np.clip(predicted_random_effects(residuals, noise).log_factors, -LARGEST_FACTOR, LARGEST_FACTOR)
     known = 0.0 if problem.log_factors is None else problem.log_factors
     return problem.about_rates(x, log_factors) if np.abs(log_factors - known).max() >= NOTEWORTHY_FACTOR else problem
 

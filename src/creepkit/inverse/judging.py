@@ -34,7 +34,7 @@ from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY, NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.nuisance_parameters import DRIFT, Perturbation
 from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH
-from creepkit.inverse.perturbations import effect_of_lives, sizes_of_effect
+from creepkit.inverse.perturbations import sizes_of_effect
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 from creepkit.limits import SIGNIFICANCE
@@ -97,7 +97,6 @@ class Judge:
 
     def residuals(self, linear: LinearisedProblem) -> JudgedResiduals | None:
         """What is left at the optimum of the problem, made linear there; None where no noise is known."""
-        linear = self._with_scatter_of_lives(linear)
         known = self.known.where(linear.residuals.offset_sensitivity > 0)
         if not known.judged.any():
             return None
@@ -189,14 +188,7 @@ class Judge:
             drift = self.predictor_errors.get(name, 0.0) / scale if scale else 0.0
             offset = self.noise_model[name].offset
             outputs[name] = OutputNoise(1.0, offset=offset, drift=drift, correlation_length=1.0)
-        return NoiseModel(outputs, self.noise_model.rate)
-
-    def _with_scatter_of_lives(self, linear: LinearisedProblem) -> LinearisedProblem:
-        """The problem with the scatter of lives as a random effect of each test."""
-        effect = effect_of_lives(self.problem, linear, self.noise_model)
-        if not effect.any():
-            return linear
-        return replace(linear, residuals=linear.residuals.with_effects([effect]))
+        return NoiseModel(outputs, self.noise_model.rate, life=self.noise_model.life)
 
     def _largest_deviation(self, judged: JudgedResiduals) -> LargestDeviation | None:
         """Where the deviation is largest over the known noise."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -44,7 +45,7 @@ def _check(code: int) -> None:
 class CovarianceFactor:
     """The covariance C = L L' of all tests; L^-1 r is white.
 
-    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. common : (tests,
+    series : of the observations. components : (5 outputs + 4,) as NoiseModel.components has them. common : (tests,
     observations, effects) S of errors that tests have alike, or None for none.
 
     With B = L_0 L_0' the blocks of single tests and U D V' the singular value decomposition of L_0^-1 S,
@@ -102,10 +103,10 @@ class CovarianceFactor:
     @cached_property
     def standard_deviations(self) -> Floats:
         """(tests, observations) of each observation, with all effects: 1 of those without data."""
-        series, shared, variances = self.series, self.components[-3:], np.ones(self.series.shape)
-        noise, misfit, offset, drift, _ = self.components[:-3].reshape(-1, 5)[series.output].T
-        w, s, u, d, *effects = series.loadings[:, 1 : 5 + series.effects].T
-        states = np.stack([drift, offset * s, shared[1] * u, shared[0] * d, *effects])
+        series, shared, variances = self.series, self.components[-4:], np.ones(self.series.shape)
+        noise, misfit, offset, drift, _ = self.components[:-4].reshape(-1, 5)[series.output].T
+        w, s, u, d, b, *effects = series.loadings[:, 1 : 6 + series.effects].T
+        states = np.stack([drift, offset * s, shared[2] * u, shared[0] * d, shared[1] * b, *effects])
         of_states, white = (states**2).sum(axis=0), (noise * w) ** 2 + misfit**2
         variances.flat[series.places] = (1.0 + RELATIVE_JITTER) * of_states + white + ABSOLUTE_JITTER
         return np.sqrt(variances if self.common is None else variances + (self.common**2).sum(axis=-1))
@@ -148,7 +149,7 @@ class NoiseLikelihood:
         """values : (tests, observations, 1 + unknowns) residuals and their derivatives to the unknowns.
 
         precision, prior_residual : (unknowns,) of their priors, and the distance from their means.
-        components : (5 outputs + 3,) of a noise model, as NoiseModel.components has them.
+        components : (5 outputs + 4,) of a noise model, as NoiseModel.components has them.
         """
         rows, unknowns = series.rows(values), values.shape[-1] - 1
         self._components, self._value, self._gradient = components.copy(), np.zeros(1), np.zeros(components.size)
@@ -164,15 +165,26 @@ class NoiseLikelihood:
     def __call__(self, components: Floats) -> tuple[float, Floats]:
         """Value, and gradient to the logarithms of the components.
 
-        components : (5 outputs + 3,). Returns the value and (5 outputs + 3,) derivatives.
+        components : (5 outputs + 4,). Returns the value and (5 outputs + 4,) derivatives.
         """
         self._components[:] = components
         _check(function("creepkit_restricted_likelihood")(*self._arguments))
         return float(self._value[0]), self._gradient.copy()
 
 
-def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
-    """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
+class RandomEffects(NamedTuple):
+    """Best linear predictions of what tests have of their own.
+
+    offsets : (tests, outputs) in their units. log_factors : (2, tests) ln of those on the rate, and on the rate of
+    damage beside it.
+    """
+
+    offsets: Floats
+    log_factors: Floats
+
+
+def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> RandomEffects:
+    """What residuals under a noise model say of each test."""
     weighted = CovarianceFactor.of_residuals(residuals, noise_model).inverse_times(-residuals.values)
     weighted_sensitivity = residuals.offset_sensitivity * weighted
     offsets = [
@@ -180,7 +192,10 @@ def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> t
         for k, s in enumerate(noise_model.outputs.values())
     ]
     variance = noise_model.rate**2 + (0.0 if residuals.rate_errors is None else residuals.rate_errors**2)
-    return np.stack(offsets, axis=1), variance * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
+    rates, lives = variance * (residuals.log_rate_sensitivity * weighted).sum(axis=1), np.zeros(len(weighted))
+    if residuals.log_life_sensitivity is not None:
+        lives = noise_model.life**2 * (residuals.log_life_sensitivity * weighted).sum(axis=1)
+    return RandomEffects(np.stack(offsets, axis=1), np.stack([rates, lives]))
 
 
 def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:

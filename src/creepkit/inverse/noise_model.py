@@ -17,7 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.observation_series import ObservationSeries, SharedNoise
-from creepkit.inverse.observation_vector import SINGLE_VALUES
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SINGLE_VALUES
 from creepkit.records import Nuisance
 
 
@@ -51,6 +51,8 @@ class Residuals:
     correlation_coordinate : (tests, observations) -, in which drifts decay: ln t or a share of the duration.
     jacobian : (tests, observations, unknowns) derivatives to x = (u, e).
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
+    log_life_sensitivity : (tests, observations) -, derivative to ln of a factor on the rate of its damage, by which its
+        life is shorter, or None where no test is followed to rupture.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
         the typical noise of that output.
     random_effect_sensitivities : (tests, observations, effects) -, effect of one standard deviation of further random
@@ -71,6 +73,7 @@ class Residuals:
     log_rate_sensitivity: Floats
     output_index: Ints
     relative_noise: Floats
+    log_life_sensitivity: Floats | None = None
     random_effect_sensitivities: Floats | None = None
     common_effects: Floats | None = None
     discrepancy_unit: Floats | None = None
@@ -108,6 +111,7 @@ class Residuals:
             present=mask,
             jacobian=kept(self.jacobian),
             log_rate_sensitivity=kept(self.log_rate_sensitivity),
+            log_life_sensitivity=kept(self.log_life_sensitivity),
             discrepancy_unit=kept(self.discrepancy_unit),
             common_effects=kept(self.common_effects),
         )
@@ -115,12 +119,13 @@ class Residuals:
     @cached_property
     def series(self) -> ObservationSeries:
         """The same as the compiled covariance takes it."""
-        unit, further = self.discrepancy_unit, self.random_effect_sensitivities
+        unit, life, further = self.discrepancy_unit, self.log_life_sensitivity, self.random_effect_sensitivities
         effects = [
             self.relative_noise * self.offset_sensitivity,
             self.offset_sensitivity,
             np.zeros_like(self.values) if unit is None else unit,
             self.log_rate_sensitivity,
+            np.zeros_like(self.values) if life is None else life,
         ]
         stacked = np.stack(effects, axis=-1)
         ends = None if self.stopped.sd is None else self.stopped.sd[..., None]
@@ -160,7 +165,7 @@ class OutputNoise:
 OUTPUT_COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
 
 
-SHARED_COMPONENTS = ("rate", "discrepancy", "discrepancy_length")
+SHARED_COMPONENTS = ("rate", "life", "discrepancy", "discrepancy_length")
 """Components that outputs share; they belong to the output ""."""
 
 
@@ -168,7 +173,8 @@ SHARED_COMPONENTS = ("rate", "discrepancy", "discrepancy_length")
 class NoiseModel:
     """Standard deviations of the sources of scatter, such as noise_model["strain"].offset and noise_model.rate.
 
-    outputs : of each output, in the order of the observations; rate : of ln rate between tests.
+    outputs : of each output, in the order of the observations; rate, life : of ln rate, and of ln rate of damage
+        beside it, between tests.
     discrepancy : of the model discrepancy, in noises (see Residuals.discrepancy_unit), and discrepancy_length : its
         correlation length, in correlation time.
     """
@@ -177,6 +183,7 @@ class NoiseModel:
     rate: float = 0.0
     discrepancy: float = 0.0
     discrepancy_length: float = 1.0
+    life: float = 0.0
 
     def __getitem__(self, output: str) -> OutputNoise:
         return self.outputs[output]
@@ -187,7 +194,7 @@ class NoiseModel:
 
     @property
     def components(self) -> Floats:
-        """(5 outputs + 3,) OUTPUT_COMPONENTS of each output, then SHARED_COMPONENTS."""
+        """(5 outputs + 4,) OUTPUT_COMPONENTS of each output, then SHARED_COMPONENTS."""
         own = [getattr(s, name) for s in self.outputs.values() for name in OUTPUT_COMPONENTS]
         return np.array([*own, *(getattr(self, name) for name in SHARED_COMPONENTS)], float)
 
@@ -201,7 +208,7 @@ class NoiseModel:
     def with_components(self, components: Floats) -> NoiseModel:
         """The same with other components.
 
-        components : (5 outputs + 3,) in the order of the property.
+        components : (5 outputs + 4,) in the order of the property.
         """
         own = np.split(components, range(len(OUTPUT_COMPONENTS), components.size, len(OUTPUT_COMPONENTS)))
         outputs = {
@@ -214,6 +221,12 @@ class NoiseModel:
     def with_output(self, output: str, **components: float) -> NoiseModel:
         """The same with other components of one output."""
         return replace(self, outputs={**self.outputs, output: replace(self.outputs[output], **components)})
+
+    def scatter_of_value(self, output: str) -> float:
+        """Standard deviation of ln of a single value of a test beside what its rate makes of it; 0 of none."""
+        if output not in self.outputs:
+            return 0.0
+        return float(np.hypot(self[output].misfit, self.life if output == RUPTURE_OUTPUT else 0.0))
 
     @property
     def without_offsets(self) -> NoiseModel:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.noise_covariance import RandomEffects
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, initial_prior_sd, nuisance_unit
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import Nuisance, is_length_nuisance, output_unit
@@ -48,13 +49,11 @@ class ImplausibleNuisance:
 
 
 def implausible_nuisances(
-    problem: LeastSquaresProblem, random_effects: tuple[Floats, Floats], estimates: Sequence[NuisanceEstimate]
+    problem: LeastSquaresProblem, random_effects: RandomEffects, estimates: Sequence[NuisanceEstimate]
 ) -> tuple[ImplausibleNuisance, ...]:
-    """Those of a fit, the furthest from its prior first.
-
-    random_effects : offsets (tests, outputs) in the output's unit, and ln rate factors (tests,).
-    """
-    found = [*_offsets(problem, random_effects[0]), *_rates(problem, random_effects[1]), *_explicit(problem, estimates)]
+    """Those of a fit, the furthest from its prior first."""
+    offsets, (rates, _) = random_effects
+    found = [*_offsets(problem, offsets), *_rates(problem, rates), *_explicit(problem, estimates)]
     return tuple(sorted(found, key=lambda one: -one.standard_deviations))
 
 

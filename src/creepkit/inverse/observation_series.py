@@ -51,10 +51,10 @@ class ObservationSeries:
     """What the covariance of residuals depends on beside the noise model (see src/core/noise_likelihood.hpp).
 
     shape : (tests, observations) of the residuals. places : (data,) which of them are data, in order. starts :
-    (tests + 1,) first datum of each test; output : (data,). loadings : (data, 5 + effects) lag to the previous datum of
-    the output (-1: it is the first), then what a white error, an offset, a discrepancy, ln of the rate and each further
-    random effect of one does; with factors, (data, 6 + effects + factors), whether the datum is the first of its frame,
-    and the factors of its white error. weights : (tests,) of the core, all one. effects, factors : how many.
+    (tests + 1,) first datum of each test; output : (data,). loadings : (data, 6 + effects) lag to the previous datum of
+    the output (-1: it is the first), then what a white error, an offset, a discrepancy, ln of the rate, ln of the life
+    and each further random effect of one does; with factors, (data, 7 + effects + factors), whether the datum is the
+    first of its frame, and the factors of its white error. effects, factors : how many.
     """
 
     shape: tuple[int, int]
@@ -62,7 +62,6 @@ class ObservationSeries:
     starts: Ints
     output: Ints
     loadings: Floats
-    weights: Floats
     effects: int = 0
     factors: int = 0
 
@@ -73,7 +72,7 @@ class ObservationSeries:
         """The series of observations.
 
         present, output_index, time : (tests, observations) which are data, of which output, and correlation time.
-        effects : (tests, observations, 4 + effects) the columns of the loadings behind the lag.
+        effects : (tests, observations, 5 + effects) the columns of the loadings behind the lag.
         shared_noise : of outputs whose noise is correlated.
         """
         tests, observations = present.shape
@@ -97,7 +96,7 @@ class ObservationSeries:
         starts = np.searchsorted(test, np.arange(tests + 1)).astype(np.int64)
         return cls(
             (tests, observations), places, starts, output.astype(np.int64), np.ascontiguousarray(loadings),
-            np.ones(tests), effects.shape[-1] - 4, factors,
+            effects.shape[-1] - 5, factors,
         )  # fmt: skip
 
     def rows(self, values: Floats) -> Floats:
@@ -107,8 +106,8 @@ class ObservationSeries:
     def arguments(self, components: Floats) -> tuple[Any, ...]:
         """The first arguments of functions of the core; the caller keeps the series and the components alive.
 
-        components : (5 outputs + 3,) as NoiseModel.components has them.
+        components : (5 outputs + 4,) as NoiseModel.components has them.
         """
-        counts = (self.shape[0], (components.size - 3) // 5, self.effects, self.factors)
-        arrays = (self.starts, self.output, self.loadings, self.weights, components)
+        counts = (self.shape[0], (components.size - 4) // 5, self.effects, self.factors)
+        arrays = (self.starts, self.output, self.loadings, components)
         return (*(ctypes.c_int64(n) for n in counts), *(address(array) for array in arrays))

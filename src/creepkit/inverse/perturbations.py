@@ -37,9 +37,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, prior_mean
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.residuals import life_sensitivity
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.laplace_approximation import (
     covariance_of_values,
@@ -48,7 +46,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
 )
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
 from creepkit.inverse.uncertainty.rate_scatter import rate_scatter
-from creepkit.inverse.variance_components import LinearisedProblem, restricted_log_likelihood
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import History, Nuisance, Program, RecordedLoading, dimension_named, dimensions_of, output_unit
@@ -94,7 +92,7 @@ def perturbations(
     reference, found = problem.coordinates.reference, list[Perturbation]()
     slope = float(log_rate_per_kelvin(problem, linear.x, reference.stress, reference.temperature))
     kinds = {n.kind for n in problem.settings.nuisances}
-    known = [e for e in known if e.kind not in (RATE, LIFE)] or of_lengths_and_instruments(problem, linear)
+    known = [e for e in known if e.kind != RATE] or of_lengths_and_instruments(problem, linear)
     own, common = ([one for one in known if one.common is is_common] for is_common in (False, True))
     own += [] if "offset" in kinds else _offsets(problem, linear)
     recorded = any(isinstance(h.temperature, Program) for h in full_histories)
@@ -344,14 +342,9 @@ def _with_misfit_of(change: Floats, problem: LeastSquaresProblem, noise_model: N
     return noise_model
 
 
-LIFE_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
-"""Shares of the scatter of rupture times that are tried as a scatter of lives in curves."""
-
-
-RATE, LIFE = "rate of a test", "life of a test"
-"""Kinds of what is included beside lengths and instruments, each test by itself: ln rate by temperatures and loads,
-where no nuisance lets rates scatter; the scatter of lives, as estimated of rupture times, in curves that are followed
-to rupture."""
+RATE = "rate of a test"
+"""What is included beside lengths and instruments, each test by itself: ln rate by temperatures and loads, where no
+nuisance lets rates scatter."""
 
 
 def errors_of_tests(
@@ -359,40 +352,21 @@ def errors_of_tests(
 ) -> tuple[Perturbation, ...]:
     """Errors at the optimum, of which those count that the settings include; none where they include none.
 
-    Those of lengths and instruments, then RATE and LIFE. among : how many tests there are, with others than these.
+    Those of lengths and instruments, then RATE. among : how many tests there are, with others than these.
     """
     included, tests = problem.settings.included_errors, max(among, len(problem.histories))
     if not included:
         return ()
     kinds = {n.kind for n in problem.settings.nuisances}
-    changes = {LIFE: effect_of_lives(problem, linear, noise_model)}
+    own = list[Perturbation]()
     if tests > 1 and "rate" not in kinds:
         kelvin = 0.0 if "temperature" in kinds else included.get("temperature", 0.0)
         sizes = np.array([kelvin, included.get("load", 0.0)])
         rates = np.linalg.norm(rate_slopes(problem, linear.x) * sizes, axis=1)
-        changes[RATE] = rates[:, None] * linear.residuals.log_rate_sensitivity
-    made = [Perturbation(kind, 1.0, "", residual_change=s, tests=tests, included=True) for kind, s in changes.items()]
-    own = [one for one in made if one.residual_change.any()]
+        change = rates[:, None] * linear.residuals.log_rate_sensitivity
+        made = Perturbation(RATE, 1.0, "", residual_change=change, tests=tests, included=True)
+        own += [made] if change.any() else []
     return (*of_lengths_and_instruments(problem, linear, among), *own)
-
-
-def effect_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise_model: NoiseModel) -> Floats:
-    """(tests, observations) change of residuals by the scatter of lives, one standard deviation, beside that of rates.
-
-    What rupture times miss a law by is a scatter of lives as far as the curves show it: specimens may as well break
-    before the law's creep runs away, at whatever rate. Of LIFE_SHARES of it the one is taken that makes the readings
-    likeliest, at the optimum of the linear problem.
-    """
-    lives = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
-    effect = lives * life_sensitivity(linear.residuals, problem.observations)
-    if not effect.any():
-        return effect
-
-    def log_likelihood(share: float) -> float:
-        affected = replace(linear, residuals=linear.residuals.with_effects([share * effect]))
-        return restricted_log_likelihood(affected, noise_model)
-
-    return effect * max(LIFE_SHARES, key=log_likelihood)
 
 
 def with_expected_scatter(

@@ -64,7 +64,7 @@ in tension, leaves the Jacobian short of its rank, and scipy's steps are then al
 """
 
 
-NOTEWORTHY_FACTOR = 0.005
+NOTEWORTHY_FACTOR = 0.002
 """Of ln rate of a test, from which on its curve is simulated with that factor: what is linear in it no longer holds."""
 
 
@@ -116,9 +116,10 @@ class LeastSquaresProblem:
         values by which it can be simulated.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
-    log_factors : (tests,) ln of the factors on the rates of tests about which residuals are taken, None for the law's
-        own rates. With b such a factor, r(x, b) the residuals and d their derivative to it, r(x, b) - d b is linear in
-        a rate that scatters where r(x, 0) is not (Lindstrom & Bates (1990), Biometrics 46, 673).
+    log_factors : (2, tests) ln of the factors on the rates of tests, and on those of their damage beside them, about
+        which residuals are taken, None for the law's own. With b such a factor, r(x, b) the residuals and d their
+        derivative to it, r(x, b) - d b is linear in a rate that scatters where r(x, 0) is not (Lindstrom & Bates
+        (1990), Biometrics 46, 673).
     rate_shift : (tests, observations) -, d b of them, or None.
     stopped : what tests that were stopped before rupture say; None before any noise is known, as in a search: they
         then count where they lasted longer than is predicted.
@@ -208,15 +209,21 @@ class LeastSquaresProblem:
         return replace(self, correction=correction)
 
     def about_rates(self, x: Floats, log_factors: Floats | None) -> LeastSquaresProblem:
-        """The same about other rates of tests near x (unknowns,); log_factors : (tests,) their ln, or None.
+        """The same about other rates of tests near x (unknowns,); log_factors : (2, tests) as in the class, or None.
 
-        None is larger than LARGEST_FACTOR; where some rate has no coefficient of its own, none has such a factor.
+        None is larger than LARGEST_FACTOR; what has no coefficient of its own has no such factor.
         """
-        if log_factors is None or not self.coordinates.every_rate_has_coefficient:
+        coordinates = self.coordinates
+        movable = np.array([coordinates.every_rate_has_coefficient, bool(coordinates.damage_rates)])
+        if log_factors is None or not movable.any():
             return replace(self, log_factors=None, rate_shift=None)
-        log_factors = np.clip(log_factors, -LARGEST_FACTOR, LARGEST_FACTOR)
+        log_factors = np.clip(log_factors, -LARGEST_FACTOR, LARGEST_FACTOR) * movable[:, None]
         there = replace(self, log_factors=log_factors, rate_shift=None)
-        return replace(there, rate_shift=log_factors[:, None] * there.residuals(x).log_rate_sensitivity)
+        residuals = there.residuals(x)
+        shift = log_factors[0][:, None] * residuals.log_rate_sensitivity
+        if residuals.log_life_sensitivity is not None:
+            shift = shift + log_factors[1][:, None] * residuals.log_life_sensitivity
+        return replace(there, rate_shift=shift)
 
     def about_stopped_tests(self, x: Floats, noise_model: NoiseModel) -> LeastSquaresProblem:
         """The same with what tests say that were stopped, about x (unknowns,), under a noise model."""
@@ -331,8 +338,13 @@ class LeastSquaresProblem:
     def _predicted(self, u: Floats, nuisances: NuisanceValues, sensitivities: bool) -> Prediction:
         if self.log_factors is not None:  # each test at its own rate
             u = np.repeat(u[:, None], len(self.histories), axis=1)
-            u[..., list(self.coordinates.coefficients)] += self.log_factors[:, None]
-        tests = (self.law, self.coordinates.theta(u), self.histories)
+            rates, damage = self.log_factors[..., None]
+            u[..., list(self.coordinates.coefficients)] += rates
+            theta = self.coordinates.theta(u)
+            theta[..., list(self.coordinates.damage_rates)] += damage
+        else:
+            theta = self.coordinates.theta(u)
+        tests = (self.law, theta, self.histories)
         if self.observations.followed_to_rupture.any():
             prediction = self.predictor.predict_to_rupture(*tests, sensitivities=sensitivities)
         else:
@@ -379,7 +391,7 @@ class LeastSquaresProblem:
             self.observations,
             prediction,
             self.nuisance_parameters,
-            coordinates.coefficients if coordinates.every_rate_has_coefficient else None,
+            (coordinates.coefficients if coordinates.every_rate_has_coefficient else None, coordinates.damage_rates),
             self.correction,
         )
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)

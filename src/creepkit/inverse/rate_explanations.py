@@ -35,7 +35,13 @@ from creepkit.inverse.perturbations import USUAL_ACTIVATION_ENERGY, log_rate_per
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import USUAL_ERRORS
 from creepkit.inverse.uncertainty.quantities import gradient, local_exponent, log_rate
-from creepkit.inverse.uncertainty.rate_scatter import SMALLEST_FACTOR, Evidence, rate_scatter, redundant_rates
+from creepkit.inverse.uncertainty.rate_scatter import (
+    SMALLEST_FACTOR,
+    Evidence,
+    RateScatter,
+    rate_scatter,
+    redundant_rates,
+)
 from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import temperature
 from creepkit.language.symbols import GAS_CONSTANT
@@ -107,6 +113,7 @@ class RateExplanations:
         self.problem, self.x, self.free = problem, linear.x, linear.free[: problem.parameter_count]
         held = replace(linear, precision=np.where(linear.free, linear.precision, HELD * linear.precision))
         self.scatter = replace(rate_scatter(problem, linear, noise), members={})
+        self.lives = _scatter_of_lives(problem, held, noise)
         self.held = rate_scatter(problem, held, noise)  # beside heats, whose rates would hide what stresses say
         self.stresses, self.temperatures = problem.conditions
         log_stress, activation = np.log(self.stresses), -1.0 / (GAS_CONSTANT * self.temperatures)  # -, mol/J
@@ -170,6 +177,7 @@ class RateExplanations:
         if np.unique(s.round(2)).size >= 3:
             yield from self._change("stress exponent", s, EXPONENT_CHANGE)
             yield from self._of_curves()
+            yield from self._of_lives()
         if self.problem.law.uses(temperature) and np.unique((z / max(np.ptp(z), 1e-300)).round(2)).size >= 3:
             yield from self._change("activation energy", z, ENERGY_CHANGE)
 
@@ -208,6 +216,17 @@ class RateExplanations:
             if abs(ends[1] - ends[0]) < SMALLEST_CHANGE["stress exponent"]:
                 return  # values follow the rates already
             yield Explanation("stress exponent", (), change, sd, odds, ends, (stress, stress))
+
+    def _of_lives(self) -> Iterable[Explanation]:
+        """The lives of tests depend on the stress by another exponent than the shape of curves gives the law's."""
+        if self.lives is None:
+            return
+        column, sizes = self.log_stress[:, None], np.array([EXPONENT_CHANGE])
+        evidence = self.lives.evidence(column, sizes)
+        change, sd = float(evidence.mean[0]), float(evidence.sd[0])
+        if abs(change) > SMALLEST_CHANGE["stress exponent"]:
+            odds = float(evidence.log - self.lives.evidence(column[:, :0], sizes[:0]).log)
+            yield Explanation("life exponent", (), change, sd, odds)
 
     @cached_property
     def _slope(self) -> Floats:
@@ -416,3 +435,14 @@ class RateExplanations:
 
     def _energy(self, u: Floats, stress: float, T: float) -> float:
         return float(log_rate_per_kelvin(self.problem, u, stress, T)) * GAS_CONSTANT * T**2
+
+
+def _scatter_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, noise: NoiseModel) -> RateScatter | None:
+    """The scatter of lives between tests beside their rates, as rate_scatter() has it of rates; None without lives."""
+    residuals = linear.residuals
+    if not noise.life > 0.0 or residuals.log_life_sensitivity is None:
+        return None
+    lives, rates = residuals.log_life_sensitivity, residuals.log_rate_sensitivity
+    residuals = replace(residuals, log_rate_sensitivity=lives, log_life_sensitivity=rates)
+    noise = replace(noise, rate=noise.life, life=noise.rate)
+    return replace(rate_scatter(problem, replace(linear, residuals=residuals), noise), members={}, known=None)

@@ -11,7 +11,7 @@ the predicted curve, in strain and in the logarithm of time, in units of both er
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -95,13 +95,14 @@ def residuals_of_prediction(
     observations: ObservationVector,
     prediction: Prediction,
     nuisance_parameters: NuisanceParameters,
-    coefficients: Sequence[int] | None,
+    coefficients: tuple[Sequence[int] | None, Sequence[int]],
     correction: Floats | None = None,
 ) -> Residuals:
     """Residuals of one candidate, with derivatives to internal parameters and nuisance parameters.
 
     coefficients : positions of the rate coefficients of all terms and internal variables, whose sum is the effect of a
-        factor on all rates; None where one has none of its own, and the derivative to ln t takes its place.
+        factor on all rates; None where one has none of its own, and the derivative to ln t takes its place. Then of
+        those of damage; without any, the end of curves moves as in life_sensitivity().
     correction : (tests, observations) in the output's unit, what is added to the prediction.
     """
     assert prediction.jacobian is not None
@@ -120,29 +121,36 @@ def residuals_of_prediction(
         time_jacobian, time_offsets = _time_derivatives(observations, prediction.times_to_strain)
         jacobian += by_time[..., None] * time_jacobian
         offsets += by_time * time_offsets
-    if coefficients is None:
+    of_rates, of_damage = coefficients
+    if of_rates is None:
         log_rate_sensitivity = by_strain * _time_derivative(observations, predicted[0]) + by_time
     else:
-        log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
-    return _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity)
+        log_rate_sensitivity = np.asarray(jacobian[..., list(of_rates)].sum(axis=-1))
+    found = _masked_residuals(observations, distance.values[0], offsets, jacobian, log_rate_sensitivity)
+    if not observations.followed_to_rupture.any():
+        return found
+    if of_damage:
+        return replace(found, log_life_sensitivity=found.jacobian[..., list(of_damage)].sum(axis=-1))
+    lives = np.where(observations.rupture_mask, 1.0, life_sensitivity(found))
+    followed = observations.followed_to_rupture[:, None] & observations.present
+    return replace(found, log_life_sensitivity=np.where(followed, lives, 0.0))
 
 
-def life_sensitivity(residuals: Residuals, observations: ObservationVector) -> Floats:
-    """(tests, observations) -, derivative of the residuals of frames to ln of the rupture life; 0 of other tests.
+def life_sensitivity(residuals: Residuals) -> Floats:
+    """(tests, observations) -, derivative of the residuals of frames to -ln of the rupture life, where no damage grows.
 
     Specimens of one alloy that creep alike still break at different times, and the last part of their curves moves with
     the life. Along a curve whose creep ends in a damage that grows at a rate of its own, such as
 
         e = A t_r lambda [1 - (1 - t / t_r)^(1 / lambda)]
 
-    a life longer by a factor exp(b) moves the time at which a strain is reached by (1 - 1/s) b in ln t, with
+    a life shorter by a factor exp(b) moves the time at which a strain is reached by (1 - 1/s) b in ln t, with
     s = d ln e / d ln t: not at all in steady creep, where s = 1, and by all of b at rupture, where s is infinite. A
     rate that scatters moves the whole curve by one amount in ln t, and the orthogonal residual of the frame by
     L = sqrt(2) s / sqrt(1 + s^2); with that, a life moves it by L - sqrt(2 - L^2).
     """
     shift = np.clip(residuals.log_rate_sensitivity, 0.0, np.sqrt(2.0))
-    effect = np.maximum(shift - np.sqrt(np.maximum(2.0 - shift**2, 0.0)), 0.0)
-    return np.where(observations.followed_frames & residuals.present, effect, 0.0)
+    return np.asarray(np.maximum(shift - np.sqrt(np.maximum(2.0 - shift**2, 0.0)), 0.0))
 
 
 def median_log_rate_excess(observations: ObservationVector, residuals: Floats) -> Floats:

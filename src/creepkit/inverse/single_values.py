@@ -161,7 +161,7 @@ class LawAtTests:
             effects = by_parameter[:, list(coordinates.coefficients)].sum(axis=1)
         misfit = None
         if self.noise_model is not None:
-            misfit = self.noise_model[output].misfit ** 2 if output in self.noise_model.outputs else 0.0
+            misfit = self.noise_model.scatter_of_value(output) ** 2
         posterior, locations, variances = self.scatter.posterior, [], []
         means, covariances = self.scatter.joint_at_nodes
         of_u = by_parameter @ coordinates.jacobian(self.u)

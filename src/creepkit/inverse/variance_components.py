@@ -189,6 +189,10 @@ SMALLEST_RATE_SCATTER = 1e-4
 """Of ln rate between tests, where an estimate of none ends."""
 
 
+SMALLEST_LIFE_SCATTER = 1e-5
+"""Of ln rate of damage, less: near rupture a life shows as exactly as time is read."""
+
+
 LARGEST_RATE_SCATTER = 1.0
 """Of ln rate between tests, a factor of 2.7: a law that needs more misses what the tests differ in."""
 
@@ -212,6 +216,7 @@ search is repeated from half way."""
 
 BOUNDS = {
     "rate": (SMALLEST_RATE_SCATTER, LARGEST_RATE_SCATTER),
+    "life": (SMALLEST_LIFE_SCATTER, LARGEST_RATE_SCATTER),
     "discrepancy": (1e-2, LARGEST_DISCREPANCY),
     "discrepancy_length": (SHORTEST_DISCREPANCY, LONGEST_CORRELATION),
     "correlation_length": (SHORTEST_CORRELATION, LONGEST_DRIFT),
@@ -244,6 +249,7 @@ def estimate_variance_components(
         and (n != "correlation_length" or components.drift > 0)
     ]
     free += [("", "rate")] if start.rate > 0 and not known_sd(nuisances, "rate") else []
+    free += [("", "life")] if start.life > 0 else []
     free += [("", "discrepancy"), ("", "discrepancy_length")] if start.discrepancy > 0 else []
     if not free:
         return start

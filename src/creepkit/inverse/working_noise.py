@@ -64,6 +64,11 @@ INITIAL_SINGLE_VALUE_SD = 0.3
 """Scatter of ln of rupture times and of minimum rates to begin from: one of each test, which cannot drift."""
 
 
+INITIAL_LIFE_SD = LARGEST_RATE_SCATTER
+"""Scatter of ln of the rate of damage between tests to begin from, where curves show it: what they share of their
+beginning is then that of rates."""
+
+
 UNRELATED_RATES = 0.95 * LARGEST_RATE_SCATTER
 """Scatter of ln rate, near the largest that is looked for, from which on the rates of tests say nothing of a law."""
 
@@ -150,10 +155,15 @@ class WorkingNoiseEstimator:
         replace: a discrepancy of all outputs rather than drifts of each. A drift whose correlation is as long as may be
         is no noise of an instrument: the discrepancy stays in its place.
         """
-        tests = len(linearised.residuals.values)
+        residuals, tests = linearised.residuals, len(linearised.residuals.values)
+        lives = residuals.log_life_sensitivity
+        # which ends, of no offset, do not tell from their own
+        curves_show_lives = lives is not None and bool((lives * residuals.offset_sensitivity).any())
 
         def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
             start = self._initial_components(previous, tests, drift=drift, discrepancy=discrepancy)
+            life = max(previous.life, INITIAL_LIFE_SD) if curves_show_lives and tests >= MINIMUM_TESTS else 0.0
+            start = replace(start, life=life)
             noise_model = estimate_variance_components(
                 linearised.residuals,
                 start,

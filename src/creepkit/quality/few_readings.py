@@ -29,6 +29,10 @@ COPIED_DIGITS, COPIED_PART = 100.0, 0.02
 """Last digits, and part of the range, by which an output grows between two readings that are the same."""
 
 
+STEADY = 0.5
+"""Of the rate beside it: a lower one shows creep that accelerates at its beginning, or dies away at its end."""
+
+
 def doubtful_readings(history: History) -> Iterator[QualityFlag]:
     """Of the parts of FEWEST_FRAMES readings or fewer under one load, that which is far off, and copies."""
     for segment in load_segments(history) if grows(history) else ():
@@ -79,10 +83,18 @@ def _misses(t: Floats, y: Floats, readings: Sequence[int]) -> Floats:
 
 
 def _growth_between(t: Floats, y: Floats) -> Floats:
-    """(readings - 1,) growth from one reading to the next by the readings around both; 0 where one of them lacks."""
-    growth = np.zeros(y.size - 1)
-    rate = np.minimum((y[3:] - y[2:-1]) / np.diff(t)[2:], (y[1:-2] - y[:-3]) / np.diff(t)[:-2])
-    growth[1:-1] = rate * np.diff(t)[1:-1]
+    """(readings - 1,) growth from one reading to the next by the readings around both; 0 where nothing shows it.
+
+    From the first on by the two rates behind it, unless creep accelerates; up to the last by the growth over ln time
+    before it, unless creep dies away.
+    """
+    growth, rates = np.zeros(y.size - 1), np.diff(y) / np.diff(t)
+    growth[1:-1] = np.minimum(rates[2:], rates[:-2]) * np.diff(t)[1:-1]
+    growth[0] = rates[2] * (t[1] - t[0]) if rates[1] >= STEADY * rates[2] else 0.0
+    if t[-4] > 0.0:
+        steps = np.diff(np.log(t[-4:]))
+        before, last = np.diff(y[-4:-1]) / steps[:2]
+        growth[-1] = min(before, last) * steps[2] if last >= STEADY * before else 0.0
     return growth
 
 

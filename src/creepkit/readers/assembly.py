@@ -224,13 +224,14 @@ def assemble_without_frames(
         end = _time_in_remark(conditions, said)
     if ended == RUPTURED and time is None and end is not None:
         time, end = end, None
-    if rate_known and time is None and ended == RUPTURED:  # when it broke is not known
+    if rate_known and time is None and end is None and ended:  # when it ended is not known
         conditions.labels.setdefault("ended", ended)
         ended = ""
     _check_end_without_frames(time, end, ended, location)
     if not rate_known and end is not None and not ended:
-        what = f"'{end.key}' says how long the test lasted, and nothing whether it broke then; which is it?"
-        raise conditions.question(what, "ended", RUPTURED, STOPPED, location=end.location, is_free=False)
+        raise conditions.question(
+            f"'{end.key}' {UNSAID_END}", "ended", RUPTURED, STOPPED, location=end.location, is_free=False
+        )
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -275,6 +276,7 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
+UNSAID_END = "says how long the test lasted, and nothing whether it broke then; which is it?"
 _OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
 """Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
 

@@ -12,12 +12,12 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import accumulate, pairwise
+from itertools import accumulate
 
 from creepkit.files.delimited_text import Dialect, is_number, without_uncertainty
 from creepkit.readers.ends_of_tests import FIRM, LABEL, kind_of_column, plain_words
 from creepkit.readers.names import NAME_SYNONYMS, NAMES_OF, SYMBOLS
-from creepkit.readers.table import CellTable, TableRow, with_columns
+from creepkit.readers.table import CellTable, TableRow
 from creepkit.readers.vocabulary import (
     CONDITION_KINDS,
     NameTable,
@@ -103,7 +103,7 @@ _IS_TIME = re.compile(
     r"\b(?:time|temps|duree|zeit|hours?|hrs?|h|stunden|heures?|life|duration|days?|tage|jours"
     r"|tempo|tiempo|ore|horas?|durata|duracion|vita|vida|giorni|dias|tijd|duur|uur|uren|dagen|levensduur)\b|zeit\b"
 )
-RATES = re.compile(r"rate\b|geschwindigkeit\b|vitesse\b|velocit(?:a|y)\b|velocidad\b|snelheid\b")
+RATES = re.compile(r"rate\b|geschw(?:indigkeit)?\b|vitesse\b|velocit(?:a|y)\b|velocidad\b|snelheid\b")
 _OF_MINIMUM = re.compile(r"\b(?:min\w*|mcr|steady|second\w*|station\w*|sekund\w*|lowest|smallest|kleinste\w*)\b")
 _CREEP_RATE = re.compile(
     r"(?:(?:creep|strain|rate|de|fluage|vitesse|deformation|kriech\w*|kruip\w*|velocita|velocidad|di|deformazione"
@@ -145,7 +145,12 @@ positive one behind a stroke belongs to the time there: %/10^3 h."""
 _PER_CENT = (
     r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|procent\b|pour ?cent\b|per ?cento\b|por ?ciento\b)"
 )
-_SYMBOL_TO_STRAIN = re.compile(rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?", re.IGNORECASE)
+_SYMBOL_TO_STRAIN = re.compile(
+    rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?"
+    r"|t[\s_]?[pf][\s_]?(\d+(?:[.,]\d+)?)(?:\s*%)?(?:[\s_,/]+\w+|\s*[(\[]\w+[)\]])?",
+    re.IGNORECASE,
+)
+"""Also t_p and t_f of ISO 204, to a plastic and to a creep elongation in per cent."""
 _UNIT_IN_NAME = {
     "h": r"hours?|hrs?|stunden|heures?|ore|horas|uur|uren",
     "d": r"days|tage|jours|giorni|dias|dagen",
@@ -228,7 +233,7 @@ def _strain_reached(written: str) -> float | None:
         return None
     if _OF_NO_TEST.search(plain_words(split_written_name(text)[0])):
         return None
-    number = float(found[1].replace(",", "."))
+    number = float(next(filter(None, found.groups())).replace(",", "."))
     return number / 100 if 0 < number <= 100 else None
 
 
@@ -269,7 +274,7 @@ _NUMBER_LIKE = re.compile(
 )
 _WITH_UNIT = re.compile(r"[<>≥]?\s*[\d.,]+(?:[eEdD][+-]?\d+)?\s*(\S{1,6})")
 _ASSIGNED = re.compile(r"[^()\[\]=]+=\s*[\d.,]+\s*\S{1,6}")  # "E = 170 GPa"
-_SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
+SEARCHED, _DEEPEST, _MOST_IN_COLUMNS = 60, 5, 30
 """Rows within which the tests must begin; rows of a head; and of a table whose tests stand in columns."""
 
 
@@ -278,8 +283,8 @@ def is_number_like(cell: str, dialect: Dialect) -> bool:
     return is_number(cell, dialect) or _NUMBER_LIKE.fullmatch(without_uncertainty(cell)) is not None
 
 
-def _is_measured(cell: str, dialect: Dialect) -> bool:
-    """Whether a cell holds a number, perhaps with a unit behind it."""
+def is_measured(cell: str, dialect: Dialect) -> bool:
+    """Whether a cell holds a number, perhaps marked or with a unit behind it."""
     with_unit = _WITH_UNIT.fullmatch(cell)
     has_unit = with_unit is not None and unit_suffix(with_unit[1]) not in (None, "pct")
     return has_unit or is_number_like(cell, dialect)
@@ -299,8 +304,8 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
     meant : {name as written: what it is} of columns that were named otherwise.
     """
     rows, dialect = table.rows, table.dialect
-    searched = enumerate(rows[:_SEARCHED])
-    body = next((k for k, row in searched if sum(_is_measured(c, dialect) for c in row.cells if c) > 1), 0)
+    searched = enumerate(rows[:SEARCHED])
+    body = next((k for k, row in searched if sum(is_measured(c, dialect) for c in row.cells if c) > 1), 0)
     while body > 1 and only_text(rows[body - 1], dialect):  # sections above the first test
         body -= 1
     first = body
@@ -308,6 +313,9 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
         first -= 1
     for start in range(body - 1, first - 1, -1):
         names = _joined([row.cells for row in rows[start:body]], meant)
+        said = (table.sheet, table.path.stem, *(cell for row in rows[:start] for cell in row.cells))
+        if any(map(SAYS_RUPTURE.search, said)):
+            names = _with_rupture_times(names, meant)
         if not is_test_table([meant.get(name, name) for name in names], rows[body:]):
             continue
         # A further row above may hold units, or what stands above several columns.
@@ -321,22 +329,27 @@ def head_of_tests(table: CellTable, meant: Mapping[str, str]) -> TestTableHead |
     return None
 
 
-def side_by_side(table: CellTable) -> list[CellTable]:
-    """The tables of tests beside one another in a table, whose columns begin with the same name; else the table alone.
+SAYS_RUPTURE = re.compile(r"rupture|zeitstand|bruchzeit|standzeit|time to failure|rott?ura", re.IGNORECASE)
+"""In a title, or the name of a sheet or file, of a table whose times are those to rupture."""
 
-    What stands alone in a row above their names is of all of them.
-    """
-    for at, row in enumerate(table.rows[:_SEARCHED]):
-        named = [k for k, cell in enumerate(row.cells) if cell]
-        starts = [k for k in named if row.cells[k] == row.cells[named[0]]]
-        parts = [range(*ends) for ends in pairwise([*starts, len(row.cells)])]
-        if len(starts) > 1 and all(is_test_table([row.cells[k] for k in part]) for part in parts):
-            titles = [one for one in table.rows[:at] if only_text(one, table.dialect) and one.cells[0]]
-            others = [one for one in table.rows if one not in titles]
-            rows = ([one for one in with_columns(others, part) if any(one.cells)] for part in parts)
-            of_parts = zip(rows, parts, strict=True)
-            return [replace(table, rows=[*titles, *own], positions=part) for own, part in of_parts]
-    return [table]
+
+def _with_rupture_times(names: Sequence[str], meant: Mapping[str, str]) -> list[str]:
+    """The names of columns below a title that speaks of rupture: a time behind a stress is then that to rupture."""
+    columns = [column_called(meant.get(name, name)) for name in names]
+    at = _time_behind_stress(names, columns)
+    return [f"rupture {name}" if k == at and name not in meant else name for k, name in enumerate(names)]
+
+
+def _time_behind_stress(names: Sequence[str], columns: Sequence[TestColumn]) -> int | None:
+    """The time in a table of nothing else but stresses, temperatures and what tests are called, behind the stress."""
+    quantities = [one.quantity if name else None for name, one in zip(names, columns, strict=True)]
+    if not {"stress", "end_time"} <= {*quantities} <= _BESIDE_A_TIME:
+        return None
+    at = quantities.index("end_time")
+    return at if quantities.index("stress") < at else None
+
+
+_BESIDE_A_TIME = frozenset((None, "stress", "temperature", "end_time", "name", "specimen", "alloy", "label heat"))
 
 
 def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:
@@ -349,7 +362,7 @@ def _is_of_one_head(rows: Sequence[TableRow], below: int) -> bool:
 def _may_name(row: TableRow, dialect: Dialect) -> bool:
     filled = [cell for cell in row.cells if cell]
     is_head = len(set(filled)) > 1 or bool(unit_suffix(filled[0]))
-    return is_head and not any(_is_measured(cell, dialect) or _ASSIGNED.fullmatch(cell) for cell in filled)
+    return is_head and not any(is_measured(cell, dialect) or _ASSIGNED.fullmatch(cell) for cell in filled)
 
 
 def _understood(names: Sequence[str], meant: Mapping[str, str]) -> int:
@@ -397,12 +410,25 @@ def is_test_table(names: Sequence[str], rows: Sequence[TableRow] = ()) -> bool:
     found = {one.quantity for one in columns}
     is_named = any(_differ(rows, k) for k, one in enumerate(columns) if one.quantity in ("name", "specimen"))
     measured = not {"minimum_rate", "rupture"}.isdisjoint(found) or any(one.strain is not None for one in columns)
-    rates = [split_written_name(name)[1] for name in names if RATES.search(plain_words(split_written_name(name)[0]))]
+    rates = [unit for name, unit in map(split_written_name, names) if is_unit_of_rate(unit) or _is_rate(name)]
     measured |= any(unit_suffix(unit) in RATE.units for unit in rates) and "end_time" not in found
     measured |= any(one.quantity == f"label {name}" for one, name in zip(columns, names, strict=True))
     measured |= "end_time" in found and (is_named or any(kind_of_column(name) in FIRM for name in names))
+    if (at := _time_behind_stress(names, columns)) is not None:  # no record begins after time zero so
+        measured |= len(rows) > 1 and not any(
+            re.fullmatch(r"0*[.,]?0*", row.cells[at]) for row in rows if len(row.cells) > at
+        )
     is_framed = "end_time" in found and has_frames(names)
     return measured and not {"stress", "temperature"}.isdisjoint(found) and (is_named or not is_framed)
+
+
+def _is_rate(name: str) -> bool:
+    return RATES.search(plain_words(name)) is not None
+
+
+def is_unit_of_rate(unit: str) -> bool:
+    """Whether a unit is one of a rate alone, such as %/h."""
+    return "/" in unit and unit_suffix(unit) in RATE.units
 
 
 def _differ(rows: Sequence[TableRow], column: int) -> bool:

@@ -277,10 +277,11 @@ def is_neutral(text: str) -> bool:
 def legend_in(text: str) -> dict[str, str]:
     """{sign or code: end} of `1 = failed, 0 = censored` or `* run-out`, as names of columns and notes explain them."""
     found: dict[str, str] = {}
+    text = re.sub(rf"(?i)^\s*(?:{_REMARK_WORDS.pattern})\s*:\s*", "", text)
     for sign, words in re.findall(r"(\(\)|\S{1,12}?)\s*(?:=|:|\N{EN DASH}|means|bedeutet)\s*([^,;()=]+)", text):
         if (said := end_said_by(words)) in (RUPTURED, STOPPED, INTERRUPTED):
             found[sign.strip("'\"([ ").casefold() or "()"] = RUPTURED if said == RUPTURED else STOPPED
-    marked = re.match(r"\s*([*+†‡#^]+|\(\))\)?\s*(.+)", text)
+    marked = re.match(r"\s*([*+†‡#^>]+|\(\))\)?\s*(.+)", text)
     if marked and (said := end_said_by(marked[2].lstrip("=: "))) in (RUPTURED, STOPPED, INTERRUPTED):
         found[marked[1]] = RUPTURED if said == RUPTURED else STOPPED
     return found
@@ -305,6 +306,7 @@ def kind_of_column(name: str) -> str:
     """What the name of a column says: RUPTURED or STOPPED of tests with a yes, "status", "remark", or ""."""
     plain = plain_words(re.sub(r"\(.*?\)|\[.*?\]|\?", " ", name))
     words = set(plain.replace("|", " ").split()) - {"y", "n", "j", "ja", "nein", "yes", "no", "oui", "non"}
+    words = {one for one in words if len(one) > 2} or words if name.count("/") > 1 else words  # "Status B / UB / I"
     if any(map(_REMARK_WORDS.fullmatch, words)):
         return "remark"
     said = end_said_by(plain)
@@ -355,10 +357,10 @@ def _meanings(kind: str, plain: Set[str]) -> dict[str, str]:
         return {**_meanings_of_flags(kind, {"t", "n"}), "f": STOPPED if kind == RUPTURED else RUPTURED}
     if kind != "remark" and plain and plain <= YES | NO:
         return _meanings_of_flags(kind, plain)
-    if kind in FIRM and (codes := _CODES.get(frozenset(plain))):
-        found: dict[str, str] = dict(codes)
-    else:
-        found = {text: _meaning_of_text(kind, text) for text in plain}
+    found = {text: _meaning_of_text(kind, text) for text in plain}
+    if kind in FIRM:
+        pairs = [codes for texts, codes in _CODES.items() if texts == plain or (len(texts) > 1 and texts < plain)]
+        found |= pairs[0] if len(pairs) == 1 else {}
     if kind == "description" and plain:
         return {text: UNCLEAR if _is_nothing(text) else end for text, end in found.items()} | {"": UNCLEAR}
     if kind == "" and len(plain) == 2 and frozenset(plain) in _CODES:

@@ -197,7 +197,7 @@ def _numbered(test: TabulatedTest, number: int, parts: Sequence[TabulatedTest]) 
 def _in_order(table: CellTable, known: Terms) -> CellTable:
     """The table with its oldest row first, and with a clock h:mm:ss that begins anew in seconds."""
     time = next((k for k, name in enumerate(table.columns) if known.quantity(name) == "time"), None)
-    table = table if time is None else with_clock_in_seconds(table, time)
+    table = table if time is None else with_clock_in_seconds(table, time, known.vocabulary.synonyms)
     if time is None or not all(is_number(row.cells[time], table.dialect) for row in table.rows):
         return table
     hours = [float_of(row.cells[time]) for row in table.rows]

@@ -7,11 +7,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from creepkit.errors import HistoryError, quoted
-from creepkit.files.delimited_text import float_of, is_number
+from creepkit.files.delimited_text import Dialect, float_of, is_number
 from creepkit.files.time_stamps import is_clock_time
+from creepkit.readers.columns_of_tests import is_number_like, only_text
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of, cells_of_width
-from creepkit.readers.vocabulary import Terms
+from creepkit.readers.vocabulary import Terms, words_of
 from creepkit.readers.weak_sources import conditions_in_text
 
 
@@ -130,3 +131,31 @@ def _is_remark(row: TableRow, table: CellTable) -> bool:
     words = cells[0].lower().strip(".:*-= ").split()
     count = sum(word in _LOST for word in words)
     return (len(words) > 1 + 3 * count and count < 2) or words in (["end"], ["eof"])
+
+
+# ---- around tests in rows --------------------------------------------------------------------------------------------
+
+
+def is_signed(cell: str, signs: Collection[str]) -> bool:
+    """Whether a cell is, begins or ends with one of the signs that a note explains; `()` are brackets around it."""
+    return any(cell.startswith(one[0]) if one in ("()", ">") else cell.endswith(one) for one in signs)
+
+
+STATISTIC = re.compile(
+    r"(?:arithm\w* )?(?:mean|averages?|avg|median|sd|s d|std|st\w* ?dev\w*|cov|scatter|min(?:imum)?|max(?:imum)?|range"
+    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|[ée]cart type)(?: values?| of .*)?"
+)
+"""Of a row below tests that is no test."""
+
+
+def is_statistic(row: TableRow, dialect: Dialect) -> bool:
+    """Whether the one text in a row of numbers is that of a statistic of the rows above it."""
+    texts = [cell for cell in row.cells if cell and not is_number_like(cell, dialect)]
+    return len(texts) == 1 and STATISTIC.fullmatch(words_of(texts[0])) is not None
+
+
+def is_note(row: TableRow, dialect: Dialect, width: int) -> bool:
+    """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
+    filled = [cell for cell in row.cells if cell]
+    few = len(filled) <= 2 < width and not any(is_number_like(cell, dialect) for cell in filled)
+    return few or bool(only_text(row, dialect))

@@ -24,11 +24,12 @@ from xml.etree import ElementTree
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number, refuse_unprintable
 from creepkit.files.reading import MAXIMUM_UNPACKED_BYTES, FileKind, check_readable, read_bytes
-from creepkit.readers.columns_of_tests import column_called, head_of_tests, side_by_side
+from creepkit.readers.columns_of_tests import column_called, head_of_tests
 from creepkit.readers.frames import UNUSED, unknown_text
 from creepkit.readers.history_csv import histories_of_tests
 from creepkit.readers.parts_of_tests import parts_beside
 from creepkit.readers.questions import Question
+from creepkit.readers.separate_tables import separate_tables
 from creepkit.readers.table import (
     CellTable,
     SourceText,
@@ -354,7 +355,7 @@ class SpreadsheetReader:
 def holds_frames(sheet: CellTable, vocabulary: HeaderVocabulary) -> bool:
     """Whether a sheet has a column of time above frames, and not one row a test."""
     is_framed = _has_readings(sheet) and names_time(sheet, vocabulary)
-    return is_framed and head_of_tests(side_by_side(sheet)[0], vocabulary.synonyms) is None
+    return is_framed and head_of_tests(separate_tables(sheet, vocabulary.synonyms)[0], vocabulary.synonyms) is None
 
 
 def _has_readings(sheet: CellTable) -> bool:

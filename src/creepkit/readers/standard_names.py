@@ -22,10 +22,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import Dialect, is_number, without_uncertainty
-from creepkit.files.time_stamps import DATE_ORDERS, DAY, ClockColumn, is_clock_time, resolve, through_midnight
+from creepkit.files.time_stamps import (
+    DATE_ORDERS,
+    DAY,
+    ClockColumn,
+    check_increasing,
+    is_clock_time,
+    resolve,
+    through_midnight,
+)
 from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
@@ -225,7 +233,8 @@ def _decided_by_table(name: str, table: CellTable) -> tuple[str, str]:
 _ELAPSED = re.compile(r"(\d{1,6}):([0-5]\d)(?::([0-5]\d(?:[.,]\d{1,9})?))?", re.ASCII)
 
 
-_ELAPSED_NAME = re.compile(r"elapsed|test time|creep time|laufzeit|h:mm|\[h|hh:mm|h:m", re.IGNORECASE)
+_ELAPSED_WORD = re.compile(r"elapsed|test time|creep time|laufzeit", re.IGNORECASE)
+_ELAPSED_NAME = re.compile(rf"{_ELAPSED_WORD.pattern}|h:mm|\[h|hh:mm|h:m", re.IGNORECASE)
 
 
 OF_DAY, ELAPSED = ("time of day", "clock", "clock time", "uhrzeit"), "elapsed time"
@@ -290,6 +299,7 @@ def _times_of(table: CellTable, clock: int, synonyms: Mapping[str, str]) -> tupl
     meant = synonyms.get(name, name)
     if words_of(meant) in OF_DAY:
         times = through_midnight(times)[0]
+        check_increasing(times, _place_of_rows(table), table.lines, _AT_MIDNIGHT)
         return times - times[0], f"time since the first row at {table.rows[0].cells[clock]}"
     if _ELAPSED_NAME.search(meant):
         return times, f"times such as {table.rows[-1].cells[clock]} in {form}" * (count == 2)
@@ -316,32 +326,61 @@ def oldest_first(table: CellTable) -> CellTable:
     return replace(table, rows=table.rows[::-1]).assuming("rows turned round as the newest stands first")
 
 
-def with_clock_in_seconds(table: CellTable, clock: int) -> CellTable:
-    """The table with elapsed times h:mm:ss that begin anew, as behind a pause, in seconds; any other as it is.
+def with_clock_in_seconds(table: CellTable, clock: int, synonyms: Mapping[str, str]) -> CellTable:
+    """The table with times h:mm:ss that begin anew, as behind a pause or a day, in seconds; any other as it is.
 
-    A fall from an hour shortly before midnight may be one of the time of day.
+    A clock of 24 h that goes on past midnight at the pace of the readings around counts days. Question where it may
+    begin anew as well.
     """
     name, cells = table.as_written(clock), list(cells_of(table.rows, clock))
-    pattern = _PATTERN.search(name)
+    pattern, meant = _PATTERN.search(name), (synonyms.get(name, name), split_written_name(name)[0])
     is_of_hours = pattern is None or pattern[0].lower().startswith(("h:mm", "hh:mm"))
-    if not (is_of_hours and all(map(_ELAPSED.fullmatch, cells))) or words_of(split_written_name(name)[0]) in OF_DAY:
+    if {*map(words_of, meant)} & {*OF_DAY} or not (is_of_hours and all(map(_ELAPSED.fullmatch, cells))):
         return table
     seconds = _seconds_of(table, clock, _H_MM_SS[: cells[0].count(":") + 1])
-    before = seconds[:-1][np.diff(seconds) < 0.0]
-    is_elapsed = _ELAPSED_NAME.search(name) or ((before < 0.75 * DAY) | (before >= DAY)).all()
+    falls, notes = np.flatnonzero(np.diff(seconds) < 0.0), list[str]()
+    if not falls.size:
+        return table
+    is_of_a_day = seconds.max() < DAY and (np.diff(seconds)[falls] < -0.5 * DAY).all()
+    if is_of_a_day and (seconds[falls + 1].any() or not _ELAPSED_WORD.search(name)):
+        whole, is_answered = through_midnight(seconds)[0], name in synonyms
+        if _keeps_its_pace(whole, falls) and seconds[falls + 1].all() and (is_answered or seconds[0] == 0.0):
+            seconds, notes = whole, [f"'{name}' passes midnight {falls.size} time{'s' if falls.size > 1 else ''}"]
+        elif not is_answered:
+            what = f"'{name}' falls from {cells[falls[0]]} to {cells[falls[0] + 1]}"
+            what = f"{what}, and may be elapsed or of the day: does it begin anew there, or pass midnight?"
+            choices = ({name: words.replace(" ", "_")} for words in (OF_DAY[0], ELAPSED))
+            raise table.question(what, "columns", *choices, line=table.rows[falls[0] + 1].line)
     texts = [f"{one:.12g}".replace(".", table.dialect.decimal) for one in seconds]
-    return table.renamed(table.columns).with_cells(clock, "time_s", texts) if before.size and is_elapsed else table
+    return table.renamed(table.columns).with_cells(clock, "time_s", texts).assuming(*notes)
+
+
+def _keeps_its_pace(times: Floats, falls: Ints) -> bool:
+    """Whether steps of time after readings are about as long as one beside each; times : (readings,) s."""
+    steps = np.diff(times)
+    beside = [[steps[n] for n in (k - 1, k + 1) if 0 <= n < steps.size] for k in falls]
+    return all(
+        any(steps[k] < 1.5 * one and one < 1.5 * steps[k] for one in near)
+        for k, near in zip(falls, beside, strict=True)
+    )
+
+
+_AT_MIDNIGHT = " (a time of day may begin anew at midnight only; of readings 12 h apart or more write the dates, too)"
+
+
+def _place_of_rows(table: CellTable) -> str:
+    """Before the colon and the number of a row."""
+    return f"{table.path}, sheet '{table.sheet}', row" if table.sheet else str(table.path)
 
 
 def _since_first_row(table: CellTable, clock: int, order: str, zone: str) -> tuple[Floats, str]:
     """(rows,) s of time stamps since that of the first row, and what was assumed of them."""
     column, cells = ClockColumn(), list(cells_of(table.rows, clock))
     column.add(cells, [table.location(row.line) for row in table.rows])
-    if -1 in column.rows[0]:
+    if -1 in column.rows[0] and not all(cell[-1].isalpha() for cell in cells):  # 10:00:00 PM
         k = int(np.argmax(column.rows[0] == -1))
         place = table.location(table.rows[k].line)
         raise HistoryError(f"{place}: time is '{quoted(cells[k])}'; write h:mm:ss, a date with a time, or a number")
-    place = f"{table.path}, sheet '{table.sheet}', row" if table.sheet else str(table.path)
-    times = resolve(column, place, table.lines, order, zone)
+    times = resolve(column, _place_of_rows(table), table.lines, order, zone)
     notes = [note.removeprefix("its ") for note in times.notes if note.startswith("its dates")]
     return times.times, "; ".join([f"time since the first row at {cells[0]}", *notes]).replace(",", " -")

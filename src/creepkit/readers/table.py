@@ -36,6 +36,7 @@ from creepkit.files.delimited_text import (
     two_readings,
     without_uncertainty,
 )
+from creepkit.files.time_stamps import DAYS
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
 from creepkit.readers.questions import Answer, Question
 from creepkit.readers.vocabulary import plain_name, split_written_name, unit_suffix
@@ -296,16 +297,22 @@ _IN_UNIT = re.compile(r"(?:(?:values )?(?:in|en) )?(.{1,8}?)(?:[,;.].*)?", re.IG
 
 
 def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
-    """The table without powers of ten, footnote marks, signs between thousands, and logarithms.
+    """The table without powers of ten, days before hours, footnote marks, signs between thousands, and logarithms.
 
     is_stated : whether the decimal sign is stated.
     """
     rows = list(table.rows)
     for k, row in enumerate(rows):
+        if any(":" in cell and DAYS.fullmatch(cell) for cell in row.cells):
+            rows[k] = row = TableRow(row.line, [DAYS.sub(_hours, cell) for cell in row.cells])
         if any("10" in cell and _POWER.search(cell) for cell in row.cells):
             rows[k] = TableRow(row.line, [_POWER.sub(_exponent, cell) for cell in row.cells])
     table = _without_footnotes(replace(table, rows=rows))
-    return _without_logarithms(_without_thousands(table, is_stated=is_stated))
+    return _in_whole_units(_without_logarithms(_without_thousands(table, is_stated=is_stated)))
+
+
+def _hours(found: re.Match[str]) -> str:
+    return f"{24 * int(found[1]) + int(found[2])}{found[3]}"
 
 
 def _exponent(power: re.Match[str]) -> str:
@@ -391,6 +398,31 @@ def _without_logarithms(table: CellTable) -> CellTable:
         powers = {k: text.replace(".", table.dialect.decimal) for k, text in powers.items()}
         changed.append(TableRow(row.line, [powers.get(k, cell) for k, cell in enumerate(row.cells)]))
     return replace(table, rows=[*rows[:at], *changed]).assuming(*notes)
+
+
+_PART_OF_UNIT = re.compile(r"(?P<name>.+?)\s*[(\[]\s*(?P<part>0[.,]0*1)\s*(?P<unit>[^\W\d]+)\s*[)\]]")
+"""Name of a column in parts of a unit, as a dial gauge has them: `Gauge 1 (0.01 mm)`."""
+
+
+def _in_whole_units(table: CellTable) -> CellTable:
+    """The table with columns in parts of a unit in that unit."""
+    at, found = next(
+        (
+            (n, parts)
+            for n, row in enumerate(table.rows[:60])
+            if (parts := {k: part for k, cell in enumerate(row.cells) if (part := _PART_OF_UNIT.fullmatch(cell))})
+        ),
+        (0, {}),
+    )
+    rows = [*table.rows]
+    for n, row in enumerate(rows[at:], at) if found else ():
+        whole = {k: float(one["part"].replace(",", ".")) for k, one in found.items() if _is_number_at(row, k, table)}
+        texts = {
+            k: f"{part * float_of(row.cells[k]):.12g}".replace(".", table.dialect.decimal) for k, part in whole.items()
+        }
+        texts |= {k: f"{one['name']} ({one['unit']})" for k, one in found.items() if n == at}
+        rows[n] = TableRow(row.line, [texts.get(k, cell) for k, cell in enumerate(row.cells)])
+    return replace(table, rows=rows).assuming(*(f"'{one[0]}' in whole {one['unit']}" for one in found.values()))
 
 
 def _is_number_at(row: TableRow, column: int, table: CellTable) -> bool:

@@ -25,6 +25,7 @@ from creepkit.readers.columns_of_tests import (
     column_called,
     is_bare_rate,
     is_number_like,
+    is_unit_of_rate,
     only_text,
     quantity_of,
     unit_in,
@@ -37,10 +38,11 @@ from creepkit.readers.ends_of_tests import (
     end_said_by,
     invalidity_said_by,
     kind_of_column,
+    legend_in,
     plain_words,
 )
 from creepkit.readers.questions import ANSWERS_FILE, Answer, Question, collected
-from creepkit.readers.remarks import rows_beside_notes, tests_named
+from creepkit.readers.remarks import STATISTIC, is_note, is_signed, is_statistic, rows_beside_notes, tests_named
 from creepkit.readers.table import (
     POINT_OF_THOUSANDS,
     CellTable,
@@ -74,12 +76,13 @@ MOST_ASKED = 6
 class TestRow:
     """The row of one test.
 
-    stated : what a row above says of its group. assumed : what was assumed of its cells. is_open : whether one is asked
-    for.
+    name : of the test. stated : what a row above says of its group. assumed : what was assumed of its cells. is_open :
+    whether one is asked for.
     """
 
     line: int
     cells: list[str]
+    name: str = field(default="", kw_only=True)
     stated: Mapping[str, SourceText] = field(default_factory=dict)
     assumed: list[str] = field(default_factory=list)
     is_open: bool = False
@@ -119,11 +122,17 @@ class TestTable:
     """A table with one row a test.
 
     table : with the names of its columns, as written and with their units. columns : what they mean. notes : titles and
-    remarks around the table. errors : to which what is wrong is added.
+    remarks around the table. errors : to which what is wrong is added. taken : names of tests of other tables, to which
+    those of this one are added.
     """
 
     def __init__(
-        self, sheet: CellTable, head: TestTableHead, vocabulary: HeaderVocabulary, errors: list[HistoryError]
+        self,
+        sheet: CellTable,
+        head: TestTableHead,
+        vocabulary: HeaderVocabulary,
+        errors: list[HistoryError],
+        taken: set[str],
     ) -> None:
         self.vocabulary, self.errors = vocabulary, errors
         self.table: CellTable = sheet
@@ -134,6 +143,7 @@ class TestTable:
         self.columns = list(self._understood_columns())
         self.is_understood = len(errors) == count
         if self.is_understood:
+            self._name_tests(_title_above(sheet, head) if sheet.positions else None, taken)
             self._fill_stated()
             self._take_answers()
             self._leave_out_silent_rows()
@@ -158,11 +168,23 @@ class TestTable:
         k = self.position("name")
         return ["" if k is None else row.cells[k] for row in self.rows]
 
-    def name_of(self, row: TestRow) -> str:
-        """The name of its test: that of its cell, else the sheet or the file, the line, and where the table begins."""
-        k, first = self.position("name"), self.table.positions[0]
-        beside = f" {self.table.location(row.line, 0).rpartition(', ')[2]}" * (first > 0)
-        return (k is not None and row.cells[k]) or f"{self.table.sheet or self.table.path.stem} {row.line}{beside}"
+    def _name_tests(self, title: str | None, taken: set[str]) -> None:
+        """Name the tests by their cells; else by the sheet or the file and the line.
+
+        title : of one of several tables of a sheet, in which title, temperature and stress tell a test better.
+        """
+        sheet, told, above = self.table.sheet or self.table.path.stem, list[int](), dict[int, str]()
+        if title is not None:
+            stated = {one.key for one in conditions_in_text(title, "", self.vocabulary.terms())}
+            positions = (self.position(one) for one in ("temperature", "stress") if one not in stated)
+            told = [k for k in positions if k is not None]
+        for row, written in zip(self.rows, self.names_of_tests(), strict=True):
+            above |= {k: self.entry(row, k).text for k in told if re.search(r"\d", row.cells[k])}
+            units = [f"{above.get(k, '')} {split_written_name(self.names[k])[1]}" for k in told]
+            plain = f"{sheet} {row.line}" if title is None else " ".join([title or sheet, *units])
+            numbered = (f"{plain} ({n})" for n in range(2, len(taken) + 3))
+            row.name = written or next(one for one in (plain, *numbered) if one not in taken)
+            taken.add(row.name)
 
     def take_labels(self, other: CellTable) -> bool:
         """Take the columns of another sheet, such as compositions, by test, heat or alloy; whether a row has them."""
@@ -189,7 +211,7 @@ class TestTable:
 
     def notes_of_rows(self) -> list[dict[str, SourceText]]:
         """The notes of each row as labels: those that name tests, or say that one does not count, are not of all."""
-        names, found = [self.name_of(row) for row in self.rows], [dict[str, SourceText]() for _ in self.rows]
+        names, found = [row.name for row in self.rows], [dict[str, SourceText]() for _ in self.rows]
         for key, entry in self._footnotes.items():
             of = entry.text.rpartition(" (of ")[2].rstrip(")").split("; ")
             rows = {k for k, row in enumerate(self.rows) if {*of} & {*row.cells}}
@@ -198,7 +220,10 @@ class TestTable:
         sentences = (one for note in self.notes for one in re.split(r"(?<=[.;]) (?=[^\W\d_])", note))
         for number, note in enumerate(sentences):
             rows, sign = tests_named(note, names), re.match(r"\W{1,3}(?=\s|$)", note)
-            if not rows and invalidity_said_by(note):
+            if not rows and (signs := legend_in(note)):
+                cells = [[cell.casefold() for cell in row.cells] for row in self.rows]
+                rows = {k for k, one in enumerate(cells) if any(is_signed(cell, signs) for cell in one)}
+            elif not rows and invalidity_said_by(note):
                 cells = [row.cells for row in self.rows] if sign else []
                 rows = {k for k, row in enumerate(cells) if sign and any(c.endswith(sign[0].strip()) for c in row)}
             elif not rows:
@@ -222,6 +247,9 @@ class TestTable:
         """Take apart names, rows, groups, margin, titles and notes."""
         known, line, dialect = self.vocabulary.terms(), sheet.rows[head.line].line, sheet.dialect
         heading = {tuple(row.cells) for row in sheet.rows[head.first : head.body]}
+        by_title = {name.removeprefix("rupture ") for name in head.names} & {cell for row in heading for cell in row}
+        by_title -= {*head.names}
+        sheet = sheet.assuming(*(f"'{quoted(name, 60)}' is that to rupture by the title" for name in sorted(by_title)))
         body = [row for row in sheet.rows[head.body :] if tuple(row.cells) not in heading]
         body = with_commas_of_remarks(sheet, body, head.names)
         below = replace(sheet, rows=[TableRow(line, list(head.names)), *body])
@@ -229,13 +257,13 @@ class TestTable:
         sheet = with_entries_of_comments(replace(sheet, header=below.header), line, known)
         around = self._around(sheet, sheet.rows[: head.first], known)
         names, body = below.rows[0].cells, list(below.rows[1:])
-        if statistics := [row for row in body if _is_statistic(row, dialect)]:
+        if statistics := [row for row in body if is_statistic(row, dialect)]:
             body = [row for row in body if row not in statistics]
             called = " and ".join(
-                cell for row in statistics for cell in row.cells if _STATISTIC.fullmatch(words_of(cell))
+                cell for row in statistics for cell in row.cells if STATISTIC.fullmatch(words_of(cell))
             )
             sheet = sheet.assuming(f"rows of {called} are no tests")
-        while body and _is_note(body[-1], dialect, len(names)):
+        while body and is_note(body[-1], dialect, len(names)):
             self.notes.append(re.sub("([:：]);", r"\1", "; ".join(dict.fromkeys(filter(None, body.pop().cells)))))
         named = [k for k, name in enumerate(names) if name]
         stated, beside = dict[str, SourceText](), dict[str, SourceText]()
@@ -262,7 +290,10 @@ class TestTable:
         """What lines above a table state of all its tests; all else is a note."""
         head = HeadOfTest(sheet, known, dict(sheet.header))
         for row in above:
-            head.read(row)
+            if text := only_text(row, sheet.dialect):
+                head.add_title(text, row)
+            else:
+                head.read(row)
         for key in [key for key in head.entries if key.startswith("label ") and key not in {*sheet.header, *TEXTS}]:
             entry = head.entries.pop(key)
             self.notes.append(entry.text if key.startswith("label line ") else f"{key[6:]} {entry.text}")
@@ -368,7 +399,7 @@ class TestTable:
     def _twice(self, written: str, other: str) -> HistoryError:
         what = f"'{quoted(other, 60)}' and '{quoted(written, 60)}' mean the same; keep one of them"
         if written == other:
-            return HistoryError(f"{self.place}: {what}, or put tables side by side below one another")
+            return HistoryError(f"{self.place}: {what}, or name what each holds")
         return self.table.question(what, "columns", {written: LABEL}, {other: LABEL})
 
     def _wrong_unit(self, column: TestColumn, written: str, cells: Sequence[str]) -> HistoryError:
@@ -401,7 +432,8 @@ class TestTable:
     def _ask_of_quantity(self, written: str) -> None:
         """Ask of a time or a rate that is not understood: `t0.2 (h)` may be one to a strain."""
         name, unit = split_written_name(written)
-        if RATES.search(plain_words(name)) and (not unit or unit_suffix(unit) in (*RATE.units, "pct")):
+        is_rate = RATES.search(plain_words(name)) and (not unit or unit_suffix(unit) in (*RATE.units, "pct"))
+        if is_rate or is_unit_of_rate(unit):
             meaning, what = f"minimum rate ({unit})" if unit else "minimum rate", "rate that is not understood; is it a"
             what = f"column '{quoted(written, 60)}' is a {what} minimum creep rate?"
         elif unit_suffix(unit) in TIME.units and not _OF_TREATMENT.search(name):
@@ -482,11 +514,11 @@ class TestTable:
         """Take what a file of answers states of single tests, in the place of cells; leave out those it excludes."""
         of_tests, excluded = self.vocabulary.of_tests, dict[str, str]()
         for row in self.rows:
-            for key, (text, place) in of_tests.get(self.name_of(row), {}).items():
+            for key, (text, place) in of_tests.get(row.name, {}).items():
                 quantity, unit = split_unit(key, {**CONDITION_KINDS, **NAMES.kinds}) or (key, "")
                 k = self.position(quantity)
                 if key == EXCLUDE:
-                    excluded[self.name_of(row)] = text
+                    excluded[row.name] = text
                 elif k is not None and self.columns[k].unit == unit:
                     row.cells[k] = text
                     row.assumed.append(f"{key} {text} of {ANSWERS_FILE}")
@@ -495,15 +527,13 @@ class TestTable:
                     self.errors.append(HistoryError(f"{place}: {what}"))
                 else:
                     row.stated = {**row.stated, key: SourceText(text, place)}
-        self._leave_out(
-            [row for row in self.rows if self.name_of(row) in excluded], lambda row: excluded[self.name_of(row)]
-        )
+        self._leave_out([row for row in self.rows if row.name in excluded], lambda row: excluded[row.name])
 
     def _leave_out(self, rows: Sequence[TestRow], reason: Callable[[TestRow], str]) -> None:
         """Leave out rows; the assumptions name them with their reasons."""
         by_reason = dict[str, list[str]]()
         for row in rows:
-            by_reason.setdefault(reason(row), []).append(self.name_of(row))
+            by_reason.setdefault(reason(row), []).append(row.name)
         for why, names in by_reason.items():
             more = f" and {len(names) - MOST_ASKED} more" if len(names) > MOST_ASKED else ""
             listed = f"{' '.join(names[:MOST_ASKED])}{more}"
@@ -541,6 +571,17 @@ class TestTable:
         return " and ".join(found) or ("nothing but ignored columns" if self.vocabulary.ignored else "no result")
 
 
+_LONGEST_TITLE = 40
+"""Characters of a title that is part of the names of tests."""
+
+
+def _title_above(sheet: CellTable, head: TestTableHead) -> str:
+    """The title directly above the names of a table, "" where there is none or a long one."""
+    above, names = sheet.rows[max(0, head.first - 1)], sheet.rows[head.first]
+    title = only_text(above, sheet.dialect) if names.line - above.line == 1 else ""
+    return title if len(title) <= _LONGEST_TITLE else ""
+
+
 def _is_word(cell: str) -> bool:
     """Whether a cell holds text in the place of a number, marks of lost values included; dashes are none."""
     return re.search(r"[^\W\d_]", cell) is not None and not re.search(r"\d", cell) and cell.casefold() not in _DITTO
@@ -549,23 +590,3 @@ def _is_word(cell: str) -> bool:
 _OF_TREATMENT = re.compile(
     r"anneal|ag(?:e?ing|ed)|temper|heat ?treat|soak|solution|glüh|auslager|anlass|recuit|revenu", re.I
 )
-
-
-_STATISTIC = re.compile(
-    r"(?:arithm\w* )?(?:mean|averages?|avg|median|sd|s d|std|st\w* ?dev\w*|cov|scatter|min(?:imum)?|max(?:imum)?|range"
-    r"|mittel(?:wert)?|durchschnitt|standardabw\w*|stabw|streuung|moy(?:enne)?|[ée]cart type)(?: values?| of .*)?"
-)
-"""Of a row below tests that is no test."""
-
-
-def _is_statistic(row: TableRow, dialect: Dialect) -> bool:
-    """Whether the one text in a row of numbers is that of a statistic of the rows above it."""
-    texts = [cell for cell in row.cells if cell and not is_number_like(cell, dialect)]
-    return len(texts) == 1 and _STATISTIC.fullmatch(words_of(texts[0])) is not None
-
-
-def _is_note(row: TableRow, dialect: Dialect, width: int) -> bool:
-    """Whether a row below the tests is one of remarks: it holds texts in one or two cells, and no number."""
-    filled = [cell for cell in row.cells if cell]
-    few = len(filled) <= 2 < width and not any(is_number_like(cell, dialect) for cell in filled)
-    return few or bool(only_text(row, dialect))

@@ -31,16 +31,16 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
-from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.assembly import UNSAID_END, assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
     RATES,
+    SAYS_RUPTURE,
     TestColumn,
     column_called,
     head_of_tests,
     is_number_like,
     only_text,
     quantity_of,
-    side_by_side,
     stands_in_columns,
     unit_in,
 )
@@ -62,6 +62,7 @@ from creepkit.readers.ends_of_tests import (
 from creepkit.readers.frames import unknown_text
 from creepkit.readers.history_csv import TABLE_SUFFIXES, TEXT_SUFFIXES
 from creepkit.readers.questions import Question, collected, raise_all
+from creepkit.readers.separate_tables import separate_tables
 from creepkit.readers.spreadsheets import SPREADSHEET_SUFFIXES, holds_frames, read_sheets
 from creepkit.readers.standard_names import in_standard_keys, specimen_named
 from creepkit.readers.table import CellTable, SourceText, TableRow
@@ -76,11 +77,11 @@ _ROUNDING = 0.01
 """Part of a time by which two that are the same may differ."""
 
 
-def tables_of(path: Path) -> list[CellTable]:
-    """The cells of a text file, or of the sheets of a spreadsheet."""
+def tables_of(path: Path, meant: Mapping[str, str]) -> list[CellTable]:
+    """The tables in a text file, or in the sheets of a spreadsheet; meant : as of `separate_tables`."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
     tables = read_sheets(path) if is_spreadsheet else [read_text_table(path)]
-    return [one_row_a_test(one) for table in tables for one in side_by_side(table)]
+    return [one_row_a_test(one) for table in tables for one in separate_tables(table, meant)]
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,9 @@ class RowPerTestReader:
         return any(map(self._is_table, sheets)) and not any(holds_frames(sheet, self.vocabulary) for sheet in sheets)
 
     def _is_table(self, table: CellTable) -> bool:
-        names, first = self.vocabulary.synonyms, one_row_a_test(side_by_side(table)[0])
-        return head_of_tests(first, names) is not None or stands_in_columns(first, names)
+        meant = self.vocabulary.synonyms
+        first = one_row_a_test(separate_tables(table, meant)[0])
+        return head_of_tests(first, meant) is not None or stands_in_columns(first, meant)
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
@@ -135,10 +137,11 @@ class RowPerTestReader:
 
     def tables(self, path: Path, errors: list[HistoryError]) -> list[TestTable]:
         """The tables of tests in a file; HistoryError where there is none. errors : to which others are added."""
-        found = [(table, head_of_tests(table, self.vocabulary.synonyms)) for table in tables_of(path)]
+        meant = self.vocabulary.synonyms
+        found = [(table, head_of_tests(table, meant)) for table in tables_of(path, meant)]
         if not any(head for _, head in found):
             for table, _ in found:
-                if stands_in_columns(table, self.vocabulary.synonyms):
+                if stands_in_columns(table, meant):
                     what = "each test stands in a column; transpose the table, so that each stands in a row"
                     raise HistoryError(f"{table.place}: {what}")
             raise HistoryError(
@@ -147,7 +150,8 @@ class RowPerTestReader:
             )
         others = [table for table, head in found if head is None]
         heads = [(table, head) for table, head in found if head is not None]
-        tables = [TestTable(table, head, self.vocabulary, errors) for table, head in heads]
+        taken = set[str]()
+        tables = [TestTable(table, head, self.vocabulary, errors, taken) for table, head in heads]
         for one in tables:
             unused = [other.sheet for other in others if not one.take_labels(other)]
             one.table = one.table.assuming(*(f"sheet '{name}' not read as it is no table of tests" for name in unused))
@@ -180,14 +184,17 @@ class RowPerTestReader:
         ]
         if assumed := ", ".join(filter(None, assumptions)):
             entries.setdefault("label assumed", SourceText(assumed, location))
-        name, where = table.name_of(row), f"sheet {sheet.sheet}, " if sheet.sheet else ""
+        name, where = row.name, f"sheet {sheet.sheet}, " if sheet.sheet else ""
         source = f"{sheet.path} ({where}{cells['name'].entry.text if 'name' in cells else f'line {row.line}'})"
         if not frames:
             return assemble_without_frames(name, entries, self.vocabulary, location=location, source=source)
         if measure := _includes_elastic(table):
             entries.setdefault("includes_elastic", SourceText(measure, location))
         rows = [TableRow(row.line, (repr(time), repr(strain), "1")) for time, strain in frames]
-        if "end_time" in cells and cells["ended"].entry.text == STOPPED:  # after the last frame, with its strain
+        if "end_time" in cells and "ended" not in entries:
+            what = f"'{cells['end_time'].entry.key}' {UNSAID_END}"
+            raise sheet.question(what, "ended", RUPTURED, STOPPED, line=row.line)
+        if "end_time" in cells and entries["ended"].text == STOPPED:  # after the last frame, with its strain
             last = cells["end_time"].seconds()
             rows += [TableRow(row.line, (repr(last), repr(frames[-1][1]), "0"))] * (last > frames[-1][0])
         columns = ("time_s", "strain_1", "used")
@@ -462,7 +469,6 @@ def _check_duration(rupture: Cell, duration: Cell | None) -> None:
 # ---- a matrix of rupture times -------------------------------------------------------------------------------------
 
 
-_OF_RUPTURE = re.compile(r"rupture|zeitstand|bruchzeit|standzeit|time to failure|rott?ura", re.IGNORECASE)
 _HEAT = re.compile(
     r"(?i:heat|cast|charge|schmelze|coulée|batch)(?: no\.?)?[ _:=#-]*((?=[A-Z\d])(?!Treat)[\w-]+?)(?:_|\b)"
 )
@@ -481,7 +487,7 @@ def one_row_a_test(table: CellTable) -> CellTable:
         if is_named and is_axis and at + 1 < len(rows):
             said = [*above, row.cells[0], table.sheet, table.path.stem]
             first = [one.cells[0] for one in rows[max(0, at - _DEEPEST) : at + 1] if one.cells[0]]
-            if any(map(_OF_RUPTURE.search, said)) and not any(map(RATES.search, map(str.casefold, said))):
+            if any(map(SAYS_RUPTURE.search, said)) and not any(map(RATES.search, map(str.casefold, said))):
                 return _unfolded(table, at, said, first) or table
     return table
 
@@ -520,7 +526,7 @@ def _unfolded(table: CellTable, at: int, said: Sequence[str], first: Sequence[st
     is_whole = "" not in levels and len(levels) == len(body)
     if not (is_stress and is_whole and of_axis["temperature"]):
         return None
-    of_rupture = [text for text in said if _OF_RUPTURE.search(text)]
+    of_rupture = [text for text in said if SAYS_RUPTURE.search(text)]
     times, loads = (
         known or next(filter(None, (unit_in(text, kind) for text in texts)), "")
         for known, texts, kind in (("", of_rupture, TIME), (of_axis["stress"], said, STRESS))

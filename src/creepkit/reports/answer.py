@@ -236,9 +236,10 @@ def rupture_figures(assessment: RuptureAssessment) -> list[KeyFigure]:
 
     With intervals of their means.
     """
-    lives = [_of_mean("time to rupture", f"{one.stress:g} MPa", one.hours, "h", one) for one in assessment.lives]
-    strengths = _longest_strengths(assessment)
-    return [*lives, *(_of_mean("rupture strength", f"{one.hours:g} h", one.value, "MPa", one) for one in strengths)]
+    count = len(assessment.tests.names)
+    lives = [_of_mean("time to rupture", f"{one.stress:g} MPa", one.hours, "h", one, count) for one in assessment.lives]
+    strengths = [(one, f"{one.hours:g} h", one.value) for one in _longest_strengths(assessment)]
+    return [*lives, *(_of_mean("rupture strength", at, value, "MPa", one, count) for one, at, value in strengths)]
 
 
 def strengths_line(assessment: RuptureAssessment) -> str:
@@ -246,8 +247,10 @@ def strengths_line(assessment: RuptureAssessment) -> str:
     found = _longest_strengths(assessment)
     if not found:
         return ""
-    shown = [(one, _of_mean("", "", one.value, "MPa", one).text) for one in found]
-    at = [f"{celsius_text(one.temperature, digits=0)} {text}" for one, text in shown]
+    shown = (interval_text((one.value or 0.0, *known_bounds(one)), "MPa") for one in found)
+    whys = (_reason_of_bounds(one).partition(":")[0] for one in found)
+    texts = (f"{text} ({why})" if why else text for text, why in zip(shown, whys, strict=True))
+    at = [f"{celsius_text(one.temperature, digits=0)} {text}" for one, text in zip(found, texts, strict=True)]
     return f"rupture strength, {found[0].hours:g} h: {', '.join(at)}"
 
 
@@ -259,9 +262,16 @@ def known_bounds(one: Any) -> tuple[float, float]:
     return (-math.inf if low is None else low), (math.inf if high is None else high)
 
 
-def _of_mean(name: str, at: str, value: Any, unit: str, one: Any) -> KeyFigure:
+def _reason_of_bounds(one: Any) -> str:
+    """Why a strength has no interval, in short; "" where it has one."""
+    return str(getattr(one, "reason", "")).replace(" of the mean", "").partition(";")[0]
+
+
+def _of_mean(name: str, at: str, value: Any, unit: str, one: Any, count: int) -> KeyFigure:
+    """count : of tests that ruptured or ran out, from which it is."""
     low, high = known_bounds(one)
-    remark = f"mean of methods{', extrapolated' * bool(one.extrapolation)}{', no lower bound' * math.isinf(low)}"
+    remark = f"mean of methods, {plural(count, 'rupture test')}{', extrapolated' * bool(one.extrapolation)}"
+    remark = "; ".join(filter(None, (remark, _reason_of_bounds(one))))
     return KeyFigure(name, f"{celsius_text(one.temperature, digits=0)}, {at}", value, low, high, unit, remark)
 
 

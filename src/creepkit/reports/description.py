@@ -186,17 +186,22 @@ def rejected(fit: Identification | TemperatureLaw) -> bool:
 
 
 def tested_range(*fits: Identification) -> str:
-    """Stresses and temperatures of the tests, "80–200 MPa, 575–625 °C"."""
+    """Stresses and temperatures of the tests, "80–200 MPa, 575–625 °C"; with ± where the load was reversed."""
     stresses, kelvin = ([end for fit in fits for end in fit.ranges[name]] for name in ("stress", "temperature"))
-    return f"{ends(stresses, 3)} MPa, {celsius_text(min(kelvin), max(kelvin), digits=0)}".replace(" to ", "–")
+    programs = [test.loading.program() for fit in fits for test in fit.histories if test.loading.quantity == "stress"]
+    is_reversed = any(one.values.min() < 0.0 < one.values.max() for one in programs)
+    return f"{'±' * is_reversed}{ends(stresses, 3)} MPa, {celsius_text(min(kelvin), max(kelvin), digits=0)}".replace(
+        " to ", "–"
+    )
 
 
 def tests_text(fit: Identification) -> str:
-    """How many tests until when; a test of which a minimum rate alone is known states no time."""
+    """How many tests until when; of tests of which a minimum rate alone is known these, without a time."""
     timed = [h.times[-1] for h in fit.histories if h.outputs or h.rupture_time is not None or h.unruptured]
     longest = max(timed, default=0.0) if fit.histories else fit.ranges["time"][1]
     until = f" to {time_text(longest)}" if longest > 0.0 else ""
-    return f"{plural(len(fit.tests), 'test')}{until}"
+    are_rates = bool(fit.histories) and not timed
+    return f"{plural(len(fit.tests), 'minimum rate' if are_rates else 'test')}{until}"
 
 
 def _truth(fit: Identification) -> str:

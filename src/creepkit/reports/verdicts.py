@@ -118,6 +118,7 @@ def _of_cause(one: Explanation) -> dict[str, Any]:
     if one.beside and factor < 1.0:
         factor, first, other = 1.0 / factor, other, first
     values = {"low": low, "high": high, "start": start, "end": end, "rises": "rises" if high > low else "falls"}
+    values |= {"size": abs(one.size), "faster": "faster" if one.size > 0 else "less fast"}
     return {"one": one, **values, "factor": factor, "first": first, "other": other, "near": [*one.near, ""][0]}
 
 
@@ -457,9 +458,10 @@ def challenge_text(one: Challenge) -> str:
         return say(
             CHALLENGES["unknown"], altered=say(CHALLENGES["unknown sum"], one=one) if one.kind == "sum" else one.subject
         )
-    side = "higher" if one.excess > 0 else "lower"
-    kind = "better" if one.fits_better else "same" if abs(one.excess) < SMALLEST_SHOWN else side
-    return say(CHALLENGES[kind], altered=say(CHALLENGES[one.kind], one=one), difference=abs(one.excess), side=side)
+    is_same = abs(one.excess) < SMALLEST_SHOWN
+    kind = "better" if one.fits_better else "higher" if one.excess > 0 and not is_same else "lower"
+    side, difference = ("the same", np.nan) if is_same else ("higher" if one.excess > 0 else "lower", abs(one.excess))
+    return say(CHALLENGES[kind], altered=say(CHALLENGES[one.kind], one=one), difference=difference, side=side)
 
 
 def _size_text(one: PerturbationSize) -> str:

@@ -144,11 +144,11 @@ BRACKETS = "In brackets: 95 % intervals, of what one new test may show where thi
 NEW_TEST = "{condition}, one new test"
 """Where a number holds whose interval has the scatter between tests in it."""
 
-BY_REJECTED = "by the law, which the tests reject"
-"""Beside numbers of such a law where the tests show none of their own."""
-
 OVER_ALL_TESTS, MEAN_SLOPE = "over all tests", "slope of the measured rates: {value}"
 """Where a stress exponent or activation energy is that of the measured rates; and beside the law's at one condition."""
+
+BY_REJECTED = "by the law, which the tests reject"
+"""Beside those of a law where the tests show none of their own."""
 
 MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 """Above the picture of minimum rates."""
@@ -333,6 +333,8 @@ CAUSES = {
     "stated groups": "{first} creeps {factor:.2g} times as fast as {other}",
     # curves and rates of tests disagree on the exponent
     "curves": "the law's {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests",
+    # curves and lives of tests disagree on how lives depend on stress
+    "life exponent": "lives of the tests fall {faster} with stress than the law's, by a power of {size:.2g}",
     # it changes more than the law lets it
     "stress exponent": "the stress exponent {rises} from {low:.2g} at {start:.4g} MPa to {high:.2g} at {end:.4g} MPa",
     # so does the energy
@@ -520,12 +522,10 @@ CHALLENGES = {
     "unknown": "whether {altered} explains the tests as well could not be examined",
     # as it says
     "better": "{altered} fits better (its chi-square is {difference:.1f} {side})",
-    # chi-squares agree
-    "same": "{altered} explains the tests as well (its chi-square is the same)",
     # the chi-square is higher
-    "higher": "{altered} is not excluded (its chi-square is {difference:.1f} higher)",
-    # or lower
-    "lower": "{altered} explains the tests as well (its chi-square is {difference:.1f} lower)",
+    "higher": "{altered} is not excluded (its chi-square is {difference:.1f} {side})",
+    # it is lower or the same
+    "lower": "{altered} explains the tests as well (its chi-square is <{difference:.1f} >{side})",
     # what is altered: a share of another law
     "sum": "a share of {one.size:whole %} of the rate by {one.other}",
     # which was not examined

@@ -258,7 +258,7 @@ FEWEST_RUPTURES = 5
 class DataSummary:
     """What tests hold that decides which stages make sense.
 
-    loads : levels above zero that are held, of all tests. temperatures : K, of distinct levels. alloys, heats : that
+    loads : levels but zero that are held, of all tests. temperatures : K, of distinct levels. alloys, heats : that
     are named. ruptured, tertiary : tests that ended by rupture, and those with tertiary creep.
     """
 
@@ -350,7 +350,7 @@ class DataSummary:
 
 
 def _held_levels(history: History) -> list[float]:
-    """Levels of the load above zero that last: those of a ramp are passed."""
+    """Levels of the load but zero that last: those of a ramp are passed."""
     values = history.loading.program().values
-    held = [float(v) for v, later in pairwise((*values, values[-1])) if v == later and v > 0]
-    return held or [float(values.max())]
+    held = [float(v) for v, later in pairwise((*values, values[-1])) if v == later and v != 0]
+    return held or [float(max(values, key=abs))]

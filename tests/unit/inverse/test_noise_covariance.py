@@ -25,8 +25,8 @@ def example(seed=0, frames=5, tests=3, correlated=False):
 
     correlated : whether the noise of the outputs of a frame is.
 
-    Absent frames, one of them the whole second output of a test; two frames at one time; tests of different weight; the
-    third unknown belongs to the first test alone.
+    Absent frames, one of them the whole second output of a test; two frames at one time; the third
+    unknown belongs to the first test alone.
     """
     rng, count = np.random.default_rng(seed), 2 * frames + 1
     times = np.sort(rng.uniform(0.1, 5.0, size=(tests, frames)), axis=1)
@@ -39,7 +39,7 @@ def example(seed=0, frames=5, tests=3, correlated=False):
     present[1, frames : 2 * frames] = False
     jacobian = rng.normal(size=(tests, count, 3)) * present[..., None]
     jacobian[1:, :, 2] = 0.0
-    values, slope, rate, unit = (rng.normal(size=(tests, count)) * present for _ in range(4))
+    values, slope, rate, unit, life = (rng.normal(size=(tests, count)) * present for _ in range(5))
     residuals = Residuals(
         values=values,
         offset_sensitivity=slope,
@@ -47,6 +47,7 @@ def example(seed=0, frames=5, tests=3, correlated=False):
         correlation_coordinate=clock,
         jacobian=jacobian,
         log_rate_sensitivity=rate,
+        log_life_sensitivity=life,
         output_index=output,
         relative_noise=1.0 + rng.uniform(size=(tests, count)),
         random_effect_sensitivities=0.3 * rng.normal(size=(tests, count, 2)) * present[..., None],
@@ -60,6 +61,7 @@ def example(seed=0, frames=5, tests=3, correlated=False):
             "rupture_time": OutputNoise(0.2 if correlated else 0.0, 0.4, 0.0, 0.0, 1.0),
         },
         rate=0.5,
+        life=0.6,
         discrepancy=1.3,
         discrepancy_length=0.8,
     )
@@ -77,11 +79,12 @@ def likelihood_of(residuals, noise, precision=(0.1, 0.0, 2.0), prior_residual=(0
 def exact_covariance(residuals, sizes, test):
     """The covariance of the data of one test, entry by entry; sizes : {(output, component): number}."""
     r, index = residuals, np.flatnonzero(residuals.present[test])
-    s, d, t, w, u = (
+    s, d, b, t, w, u = (
         [mpmath.mpf(float(v)) for v in array[test]]
         for array in (
             r.offset_sensitivity,
             r.log_rate_sensitivity,
+            r.log_life_sensitivity,
             r.correlation_coordinate,
             r.relative_noise,
             r.discrepancy_unit,
@@ -89,9 +92,9 @@ def exact_covariance(residuals, sizes, test):
     )
     effects = mpmath.matrix(r.random_effect_sensitivities[test].tolist())
     c = mpmath.zeros(index.size)
-    for a, i in enumerate(index):
-        for b, j in enumerate(index):
-            entry = sizes["", "rate"] ** 2 * d[i] * d[j]
+    for row, i in enumerate(index):
+        for column, j in enumerate(index):
+            entry = sizes["", "rate"] ** 2 * d[i] * d[j] + sizes["", "life"] ** 2 * b[i] * b[j]
             entry += sum(effects[int(i), k] * effects[int(j), k] for k in range(effects.cols))
             if r.output_index[test, i] == r.output_index[test, j]:
                 own, lag = NAMES[r.output_index[test, i]], abs(t[i] - t[j])
@@ -109,7 +112,7 @@ def exact_covariance(residuals, sizes, test):
                 own = NAMES[r.output_index[test, i]]
                 entry *= 1 + mpmath.mpf(1e-9)
                 entry += (sizes[own, "noise"] * w[i] * s[i]) ** 2 + sizes[own, "misfit"] ** 2 + mpmath.mpf(1e-10)
-            c[a, b] = entry
+            c[row, column] = entry
     return c
 
 

@@ -72,8 +72,8 @@ def test_expected_effects_find_the_offset_and_rate_of_each_test():
     residual = -(slopes * offset[:, None] + effect * log_factor[:, None])
     shape = residuals_of(residual, slopes, np.ones_like(slopes, bool), times, effect)
     found = predicted_random_effects(shape, sizes(1e-8, 0.0, 1e-3, 2.0, 0.0, 1.0))
-    np.testing.assert_allclose(found[0][:, 0], offset, rtol=1e-2)
-    np.testing.assert_allclose(found[1], log_factor, rtol=1e-2)
+    np.testing.assert_allclose(found.offsets[:, 0], offset, rtol=1e-2)
+    np.testing.assert_allclose(found.log_factors, [log_factor, [0.0, 0.0]], rtol=1e-2)
 
 
 # ---- several outputs -----------------------------------------------------------------------------------------------

@@ -52,14 +52,27 @@ def test_a_reading_that_was_copied_from_the_row_above():
         readings = np.round(
             0.5 * (times / times[-1]) ** 0.6 + 0.5 * times / times[-1] + 0.001 * rng.standard_normal(10), 4
         )
-        frame = int(rng.integers(2, 9))
+        frame = int(rng.integers(1, 10))
         readings[frame] = readings[frame - 1]
         assert flagged(times, readings) == {frame}
 
 
-def test_coarse_readings_repeat_without_a_copy():
+@pytest.mark.parametrize("frame", [1, -1])
+def test_a_copy_at_an_end_of_hours_that_double(frame):
+    hours = np.array([1.0, 2, 5, 10, 20, 50, 100])
+    readings = np.round(0.2 * hours**0.4, 4)
+    readings[frame] = readings[frame - 1]
+    assert flagged(HOUR * hours, readings) == {frame % hours.size}
+
+
+def test_readings_repeat_without_a_copy():
+    """Coarse ones, those of creep that dies away, and those before it begins."""
     times = 20.0 * HOUR * np.arange(1, 11)
     assert flagged(times, np.round(0.3 * times / times[-1], 1)) == set()
+    for tau in (0.3, 1.0, 3.0, 10.0, 30.0):
+        hours = np.array([1.0, 2, 5, 10, 20, 50, 100, 200])
+        assert flagged(HOUR * hours, np.round(1.0 - np.exp(-hours / tau), 4)) == set()
+        assert flagged(HOUR * hours, np.round(np.expm1(hours / (7 * tau)) / np.expm1(200 / (7 * tau)), 4)) == set()
 
 
 def test_a_lower_stress_lets_a_bar_recover():

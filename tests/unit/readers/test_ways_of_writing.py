@@ -168,6 +168,56 @@ def test_midnight_is_no_pause(read):
     np.testing.assert_allclose(test.times / 3600, [0, 1.5, 2.5, 4])
 
 
+def of_a_day(hours):
+    return [f"{int(h) % 24:02d}:{round(h % 1 * 60):02d}:00" for h in hours]
+
+
+def with_times(name, times):
+    hours = np.arange(len(times))
+    return f"{HEAD}{name};Strain (%)\n" + "".join(f"{t};{0.02 * h:.3f}\n" for t, h in zip(times, hours, strict=True))
+
+
+@pytest.mark.parametrize("name", ["Time", "Time (h:mm:ss)", "Elapsed time"])
+def test_a_clock_of_24_h_that_keeps_its_pace_passes_midnight(read, name):
+    """Readings every five hours for three days by a clock that shows no days."""
+    hours = np.arange(0.0, 73.0, 5.0)
+    (test,) = read(with_times(name, of_a_day(hours)))
+    np.testing.assert_allclose(test.times / 3600, hours)
+    assert "passes midnight 2 times" in test.labels["assumed"]
+
+
+def test_a_clock_that_may_pass_midnight_or_begin_anew_is_asked_of(read):
+    """From 23:48 to 0:00 after steps of five hours: a pause, or twelve minutes."""
+    text = with_times("Time", of_a_day([0, 5, 10, 15, 20, 23.8, 24, 25, 29]))
+    with pytest.raises(HistoryError, match="may be elapsed or of the day: does it begin anew there, or pass midnight"):
+        read(text)
+    (test,) = read(text, '["x.csv"]\ncolumns = {Time = "time_of_day"}\n')
+    np.testing.assert_allclose(test.times / 3600, [0, 5, 10, 15, 20, 23.8, 24, 25, 29])
+    (test,) = read(text, '["x.csv"]\ncolumns = {Time = "elapsed_time"}\nparts = "joined"\n')
+    np.testing.assert_allclose(test.times / 3600, [0, 5, 10, 15, 20, 23.8, 24.8, 28.8])
+    late = with_times("Time", of_a_day(np.arange(0.5, 40.0, 3.0)))  # elapsed since an earlier start, or of the day
+    with pytest.raises(HistoryError, match="may be elapsed or of the day"):
+        read(late)
+    for answer, first in (("time_of_day", 0.0), ("elapsed_time", 0.5)):
+        (test,) = read(late, f'["x.csv"]\ncolumns = {{Time = "{answer}"}}\n')
+        np.testing.assert_allclose(test.times / 3600, first + np.arange(0.0, 39.5, 3.0))
+
+
+@pytest.mark.parametrize("form", ["{d}.{h:02d}:{m:02d}:00", "{d} days, {h}:{m:02d}:00", "{d}d {h:02d}:{m:02d}:00"])
+def test_days_before_hours(read, form):
+    """As .NET, Python and loggers write an elapsed time."""
+    hours = [24.0, 30, 47.5, 60, 90.25]
+    (test,) = read(
+        with_times("Elapsed", [form.format(d=int(h // 24), h=int(h % 24), m=round(h % 1 * 60)) for h in hours])
+    )
+    np.testing.assert_allclose(test.times / 3600, hours)
+
+
+def test_hours_of_half_a_day(read):
+    (test,) = read(with_times("Time of day", ["10:00:00 PM", "11:30:00 PM", "12:30:00 AM", "1:00:00 PM"]))
+    np.testing.assert_allclose(test.times / 3600, [0, 1.5, 2.5, 15])
+
+
 # ---- tables beside one another, and sheets of diagrams ---------------------------------------------------------------
 
 

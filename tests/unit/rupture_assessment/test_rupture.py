@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.reports.answer import rupture_figures
 from creepkit.rupture_assessment.checks import physical_realism
 from creepkit.rupture_assessment.methods import Conditions
 from creepkit.rupture_assessment.observed_tests import rupture_tests
@@ -111,6 +112,18 @@ def test_extrapolation_is_flagged_and_what_is_not_bracketed_is_none(with_heats):
     assert longer.value is None
     assert longer.bounds_of_mean == (None, None)
     assert "a tenth of the lowest stress tested" in longer.reason or "turn back" in longer.reason
+
+
+def test_a_strength_without_an_interval_says_why_beside_it():
+    far = ck.rupture(planted(larson_miller, count=8), hours=[1e6])
+    said = [one.line for one in rupture_figures(far)]
+    assert ["no lower bound: predicted times get shorter again below" in line for line in said] == [False, True, True]
+    assert all("8 rupture tests" in line for line in said)
+    assert [far.strength(t, hours=1e6).bounds_of_mean[0] is None for t in (823.15, 873.15, 923.15)] == [
+        False,
+        True,
+        True,
+    ]
 
 
 def test_one_temperature_has_its_own_method():

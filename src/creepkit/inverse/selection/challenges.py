@@ -467,7 +467,9 @@ def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
         law, single.histories, single.predictor, single.settings, single.coordinates.reference
     )
     names = ["covariance_factor", "histories", "observations", "stopped"]
-    names += ["log_factors", "rate_shift"] if problem.coordinates.every_rate_has_coefficient else []
+    lives = single.log_factors is not None and bool(single.log_factors[1].any())
+    movable = problem.coordinates.every_rate_has_coefficient and bool(problem.coordinates.damage_rates) >= lives
+    names += ["log_factors", "rate_shift"] if movable else []
     same: dict[str, Any] = {name: getattr(single, name) for name in names}
     problem = replace(problem, **same)
     return problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)

@@ -89,6 +89,9 @@ def under_common_covariance(
 
 def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     """A law's residuals, with the derivatives that make the covariance, of the best law."""
+    lives = residuals.log_life_sensitivity
+    if lives is not None and reference.log_life_sensitivity is not None:
+        lives = np.where(reference.present, reference.log_life_sensitivity, lives)
 
     def best(of_best: Floats, own: Floats) -> Floats:
         return np.where(reference.present, of_best, own)
@@ -97,6 +100,7 @@ def with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
         residuals,
         offset_sensitivity=best(reference.offset_sensitivity, residuals.offset_sensitivity),
         log_rate_sensitivity=best(reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
+        log_life_sensitivity=lives,
     )
 
 
