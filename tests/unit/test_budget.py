@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7346,
     "records": 2473,
     "registry": 615,
-    "reports": 6706,
+    "reports": 6701,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
