@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7346,
+    "readers": 7328,
     "records": 2470,
     "registry": 615,
     "reports": 6710,
