@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 import unicodedata
@@ -383,16 +384,29 @@ _PART_OF_UNIT = re.compile(r"(?P<name>.+?)\s*[(\[]\s*(?P<part>0[.,]0*1)\s*(?P<un
 """Name of a column in parts of a unit, as a dial gauge has them: `Gauge 1 (0.01 mm)`."""
 
 
+_RECIPROCAL = re.compile(
+    r"(1(?:0{3,4}|e[34])?|10(?:\^|\*\*)[34])\s*/\s*T(?:\s*[,(\[]?\s*(?:1/K|K\^?[-−]1|/K)\s*[)\]]?)?"
+)
+"""Name of a column of an Arrhenius plot, `10^4/T (1/K)`."""
+
+
+def _divided(dividend: float, divisor: float) -> float:
+    return dividend / divisor if divisor else math.inf
+
+
 def _with_plain_columns(table: CellTable) -> CellTable:
-    """The table with numbers in the place of decimal logarithms, `log t_r (h)`, and parts of a unit, `a (0.01 mm)`."""
+    """The table with numbers in the place of decimal logarithms, reciprocal temperatures and parts of a unit."""
     rows, names, of = list(table.rows), dict[int, tuple[str, str]](), dict[int, Callable[[float], float]]()
-    patterns = _LOGARITHM, _PART_OF_UNIT
+    patterns = _LOGARITHM, _PART_OF_UNIT, _RECIPROCAL
     heads = (r for r, row in enumerate(rows[:60]) if any(p.fullmatch(cell) for p in patterns for cell in row.cells))
     at = next(heads, len(rows))
     for k, cell in enumerate(rows[at].cells if at < len(rows) else ()):
         if match := _PART_OF_UNIT.fullmatch(cell):
             names[k] = f"{match['name']} ({match['unit']})", f"'{cell}' in whole {match['unit']}"
             of[k] = partial(operator.mul, float(match["part"].replace(",", ".")))
+        elif match := _RECIPROCAL.fullmatch(cell):
+            names[k] = "T (K)", f"'{cell}' is a reciprocal temperature"
+            of[k] = partial(_divided, float(match[1].replace("10^", "1e").replace("10**", "1e")))
         elif name := _name_of_logarithm(cell, [row.cells[k] for row in rows[at:] if _is_number_at(row, k, table)]):
             names[k], of[k] = (name, f"'{cell}' is a decimal logarithm"), partial(pow, 10.0)
     for r in range(at, len(rows) if of else at):
