@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7336,
+    "readers": 7373,
     "records": 2470,
     "registry": 615,
     "reports": 6710,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_821
+TESTS = 31_849
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
