@@ -300,6 +300,14 @@ def _time_and_end(
             continue
         at = frames.line_of(label) if frames is not None else None
         if at == "earlier":
+            is_plain = len(text.split()) < 3  # "rupture of a fuse" says nothing
+            if is_plain and end_said_by(text) == RUPTURED and text.casefold() not in conditions.end_terms:
+                what = (
+                    f"'{quoted(text, 60)}' in {label} says that the test broke, and readings follow; correct them, or"
+                )
+                raise conditions.question(
+                    f"{what} does it say nothing of the test?", "ended", {text: LABEL}, is_free=False
+                )
             if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
                 what = f"remark '{quoted(text, 60)}' of {label} is not of the last frame and says no end"
                 conditions.record_assumption(what.replace(",", ";"))

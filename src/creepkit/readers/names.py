@@ -47,7 +47,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("deformazione imposta", "deformación impuesta", "creep", "total creep", "total creep strain", "dehnung"),
         *("axial strain", "tensile strain", "クリープひずみ", "zeitdehnung", "déformation", "allongement relatif"),
         *("deformation relative", "tensile strain extensometer", "deformazione", "deformación", "rek", "kruip"),
-        *("opgelegde rek",),
+        *("opgelegde rek", "eps cr", "eps c", "e cr", "ε cr", "ε c", "creep eps"),
     ),
     "diametral_strain": (
         *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),

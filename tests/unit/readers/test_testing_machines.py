@@ -234,3 +234,38 @@ def test_a_sheet_of_the_european_creep_committee(tmp_path: Path) -> None:
     (tmp_path / "tests.toml").unlink()
     with pytest.raises(HistoryError, match="says how long the test lasted, and nothing whether it broke"):
         ck.read_histories(tmp_path / "E.csv")
+
+
+def test_rates_over_reciprocal_temperatures(tmp_path: Path) -> None:
+    """The digitised points of an Arrhenius plot."""
+    kelvin, rates = (823.15, 873.15, 923.15), (1e-10, 2e-9, 3e-8)
+    rows = "".join(f"{1e4 / T:.6f},100,{math.log10(rate):.6f}\n" for T, rate in zip(kelvin, rates, strict=True))
+    (tmp_path / "p.csv").write_text(f"10^4/T (1/K),Stress (MPa),log10 creep rate (1/s)\n{rows}")
+    tests = ck.read_histories(tmp_path / "p.csv")
+    assert [test.temperature for test in tests] == pytest.approx(kelvin, abs=1e-3)
+    assert [test.minimum_rate for test in tests] == pytest.approx(rates, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "title", ["Creep test 7, 120 MPa, 600 C", "Alloy 617, 600 °C, 120 MPa", "[Inconel 625], 600 C, 120 MPa"]
+)
+def test_the_number_of_a_test_or_an_alloy_is_no_range(tmp_path: Path, title: str) -> None:
+    rows = "".join(f"{t};{100 * e:.6f};{100 * e + 0.1:.6f}\n" for t, e in zip(HOURS, CREPT, strict=True))
+    (tmp_path / "a.csv").write_text(
+        f"[Data]\n{title}\nTime (h);Creep strain (%);Total strain (%)\n{rows}", encoding="utf-8"
+    )
+    (history,) = ck.read_histories(tmp_path / "a.csv")
+    assert (history.temperature, history.loading.program().values[-1]) == (873.15, 120.0)
+    assert history.outputs["strain"] == pytest.approx(CREPT, abs=1e-8)
+    assert "'Creep strain (%)' counts and not 'Total strain (%)'" in history.labels["assumed"]
+
+
+def test_readings_behind_a_rupture_are_asked_of(tmp_path: Path) -> None:
+    said = {2: "broke", 6: ""}
+    rows = "".join(f"{t};{100 * e:.4f};{said.get(k, '')}\n" for k, (t, e) in enumerate(zip(HOURS, CREPT, strict=True)))
+    (tmp_path / "a.csv").write_text(f"Stress (MPa);120\nTemperature (C);600\nTime (h);Strain (%);Remarks\n{rows}")
+    with pytest.raises(HistoryError, match="'broke' in line 6 says that the test broke, and readings follow"):
+        ck.read_histories(tmp_path / "a.csv")
+    (tmp_path / "tests.toml").write_text('["a.csv"]\nended = {broke = "label"}\n')
+    (history,) = ck.read_histories(tmp_path / "a.csv")
+    assert history.rupture_time is None
