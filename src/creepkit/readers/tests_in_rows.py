@@ -81,7 +81,7 @@ def tables_of(path: Path, meant: Mapping[str, str]) -> list[CellTable]:
     """The tables in a text file, or in the sheets of a spreadsheet; meant : as of `separate_tables`."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
     tables = read_sheets(path) if is_spreadsheet else [read_text_table(path)]
-    return [one_row_a_test(one) for table in tables for one in separate_tables(table, meant)]
+    return [one_row_a_test(one, meant) for table in tables for one in separate_tables(table, meant)]
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class RowPerTestReader:
 
     def _is_table(self, table: CellTable) -> bool:
         meant = self.vocabulary.synonyms
-        first = one_row_a_test(separate_tables(table, meant)[0])
+        first = one_row_a_test(separate_tables(table, meant)[0], meant)
         return head_of_tests(first, meant) is not None or stands_in_columns(first, meant)
 
     def read(self, path: Path) -> list[History]:
@@ -488,10 +488,10 @@ _DEEPEST, _SEARCHED = 4, 60
 """Rows of a head; and within which the matrix must begin."""
 
 
-def one_row_a_test(table: CellTable) -> CellTable:
+def one_row_a_test(table: CellTable, meant: Mapping[str, str]) -> CellTable:
     """A matrix of rupture times as a table with one row a test; any other table as it is."""
     rows, dialect = table.rows, table.dialect
-    for at, row in enumerate(rows[:_SEARCHED]):
+    for at, row in enumerate(() if head_of_tests(table, meant) else rows[:_SEARCHED]):
         above = [cell for one in rows[max(0, at - _DEEPEST) : at] for cell in one.cells if cell]
         is_named = not is_number_like(row.cells[0], dialect)  # the row of an axis; a test begins with a number
         is_axis = any(len(_axis(row.cells[1:], kind)[0]) > 1 for kind in _AXES.values())
