@@ -102,6 +102,7 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     _take_height(conditions, name)
+    conditions.ask_of_notch()
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = up_to_rupture(conditions, from_loading_on(conditions, frames), name)
@@ -214,6 +215,7 @@ def assemble_without_frames(
     """
     known = vocabulary.terms(specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
+    conditions.ask_of_notch()
     rate_known = conditions.states("minimum_rate")
     time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)
     end = conditions.take_number("end_time")
