@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7374,
+    "readers": 7406,
     "records": 2473,
     "registry": 615,
     "reports": 6706,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_864
+TESTS = 31_896
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
