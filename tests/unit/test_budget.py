@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7271,
+    "readers": 7289,
     "records": 2470,
     "registry": 615,
     "reports": 6710,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_756
+TESTS = 31_772
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
