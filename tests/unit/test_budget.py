@@ -23,14 +23,14 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3331,
+    "exporters": 3332,
     "extraction": 1289,
     "fem": 1440,
     "files": 1313,
     "forecasts": 1184,
     "instruments": 1159,
     "integration": 792,
-    "inverse": 9460,
+    "inverse": 9468,
     "jobs": 245,
     "kernels": 1689,
     "language": 1557,
@@ -38,10 +38,10 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7289,
-    "records": 2470,
+    "readers": 7391,
+    "records": 2473,
     "registry": 615,
-    "reports": 6710,
+    "reports": 6706,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_772
+TESTS = 31_880
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -96,7 +96,7 @@ def print_result(result: StudyResult) -> None:
 
 def _test_as_options(fit: Identification) -> str:
     """A test like those that a law was identified from, as options of `creepkit predict`; TESTS where not of bars."""
-    from creepkit.reports.next_steps import are_bars
+    from creepkit.reports.advice import are_bars
 
     if not are_bars(fit):
         return "TESTS"

@@ -229,8 +229,9 @@ def assemble_without_frames(
         ended = ""
     _check_end_without_frames(time, end, ended, location)
     if not rate_known and end is not None and not ended:
-        what = f"'{end.key}' says how long the test lasted, and nothing whether it broke then; which is it?"
-        raise conditions.question(what, "ended", RUPTURED, STOPPED, location=end.location, is_free=False)
+        raise conditions.question(
+            f"'{end.key}' {UNSAID_END}", "ended", RUPTURED, STOPPED, location=end.location, is_free=False
+        )
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -275,6 +276,7 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
+UNSAID_END = "says how long the test lasted, and nothing whether it broke then; which is it?"
 _OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
 """Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
 
@@ -298,6 +300,14 @@ def _time_and_end(
             continue
         at = frames.line_of(label) if frames is not None else None
         if at == "earlier":
+            is_plain = len(text.split()) < 3  # "rupture of a fuse" says nothing
+            if is_plain and end_said_by(text) == RUPTURED and text.casefold() not in conditions.end_terms:
+                what = (
+                    f"'{quoted(text, 60)}' in {label} says that the test broke, and readings follow; correct them, or"
+                )
+                raise conditions.question(
+                    f"{what} does it say nothing of the test?", "ended", {text: LABEL}, is_free=False
+                )
             if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
                 what = f"remark '{quoted(text, 60)}' of {label} is not of the last frame and says no end"
                 conditions.record_assumption(what.replace(",", ";"))

@@ -16,7 +16,15 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     ),
     "date": ("date", "datum", "day", "tag", "jour", "data", "giorno", "fecha", "día"),
     "temperature": (
-        *("temp", "test temperature", "test temp", "creep temperature", "specimen temperature", "sample temperature"),
+        *(
+            "temp",
+            "test temperature",
+            "test temp",
+            "specimen temp",
+            "creep temperature",
+            "specimen temperature",
+            "sample temperature",
+        ),
         *("furnace", "furnace temperature", "oven temperature", "temperatur", "prüftemperatur", "versuchstemperatur"),
         *("probentemperatur", "ofen", "ofentemperatur", "temperatur ofen", "température", "température d'essai"),
         *("four", "temp ctrl", "試験温度", "温度", "temp d'essai", "prüftemp", "versuchstemp", "probentemp", "nt11"),
@@ -39,7 +47,7 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("deformazione imposta", "deformación impuesta", "creep", "total creep", "total creep strain", "dehnung"),
         *("axial strain", "tensile strain", "クリープひずみ", "zeitdehnung", "déformation", "allongement relatif"),
         *("deformation relative", "tensile strain extensometer", "deformazione", "deformación", "rek", "kruip"),
-        *("opgelegde rek",),
+        *("opgelegde rek", "eps cr", "eps c", "e cr", "ε cr", "ε c", "creep eps"),
     ),
     "diametral_strain": (
         *("diametrical strain", "diameter strain", "hoop strain", "circumferential strain", "umfangsdehnung"),
@@ -56,7 +64,16 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
         *("forza", "carga", "carga aplicada", "fuerza", "kracht", "belasting", "trekkracht"),
     ),
     "elongation": (
-        *("extension", "extn", "ext", "creep extension", "extensometer", "gauge extension", "axial extension"),
+        *(
+            "extension",
+            "extn",
+            "ext",
+            "creep extension",
+            "extensometer",
+            "extensometerweg",
+            "gauge extension",
+            "axial extension",
+        ),
         *("tensile extension", "axial extensometer", "strain gauge extension", "extensometer extension"),
         *("längenänderung", "verlängerung", "allongement", "height change", "change in height", "shortening"),
         *("stauchung", "höhenänderung", "raccourcissement", "variation de hauteur", "allungamento", "alargamiento"),

@@ -72,6 +72,7 @@ def in_standard_names(
     told = {key for key, entry in entries.items() if _tells(known.condition(key), entry.text)}
     entries = {f"label {key}" if key in told else key: entry for key, entry in entries.items()}
     stated = in_standard_keys(entries, known)
+    table = _with_creep_strain_alone(table, known)
     by_titles = [one for key, title in entries.items() for one in _stated_by_title(key, title) if one[0] not in stated]
     table = table.assuming(*(f"{key} {entry.text} by the title in {entry.location}" for key, entry in by_titles))
     for key, entry in [*_stated_by_columns(table), *by_titles]:
@@ -84,6 +85,21 @@ def in_standard_names(
     table = with_elapsed_times(stated, table, known)
     table = _with_decided_temperature(stated, table, known)
     return _with_decided_strains(stated, _without_per_cent_signs(table, known), known)
+
+
+_OF_CREEP = re.compile(r"\b(?:creep|kriech\w*|fluage|kruip\w*)\b|\b[eε](?:ps)? cr?\b")
+
+
+def _with_creep_strain_alone(table: CellTable, known: Terms) -> CellTable:
+    """The table without total, elastic and plastic strains beside the one creep strain."""
+    strains = [k for k, name in enumerate(table.columns) if known.quantity(name) == "strain"]
+    creep = [k for k in strains if _OF_CREEP.search(words_of(split_written_name(table.columns[k])[0]))]
+    others = [k for k in strains if k not in creep]
+    if len(creep) != 1 or not others or {table.columns[k] for k in strains} & known.vocabulary.synonyms.keys():
+        return table
+    listed = " and ".join(f"'{table.columns[k]}'" for k in others)
+    table = table.assuming(f"'{table.columns[creep[0]]}' counts and not {listed}")
+    return table.keeping([k for k in range(len(table.columns)) if k not in others])
 
 
 def _with_decided_temperature(stated: Mapping[str, SourceText], table: CellTable, known: Terms) -> CellTable:

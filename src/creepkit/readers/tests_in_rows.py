@@ -31,7 +31,7 @@ from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
-from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.assembly import UNSAID_END, assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
     RATES,
     SAYS_RUPTURE,
@@ -114,7 +114,7 @@ class RowPerTestReader:
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
-        errors, places, histories = list[HistoryError](), dict[str, str](), list[History]()
+        errors, places, histories = list[HistoryError](), dict[str, str](), dict[str, History]()
         for table in self.tables(path, errors):
             if not table.is_understood:
                 continue
@@ -125,15 +125,16 @@ class RowPerTestReader:
                 history = collected(errors, partial(self._history, table, row, end))
                 if history is None:
                     continue
-                place = table.table.location(row.line)
-                if history.name in places:
-                    what = f"test '{history.name}' already stands in {places[history.name]}"
+                name, place = history.name, table.table.location(row.line)
+                whole = _with_rate_of_another(histories[name], history) if name in places else history
+                if whole is None:
+                    what = f"test '{name}' already stands in {places[name]}"
                     errors.append(HistoryError(f"{place}: {what}; give each row its own name"))
-                else:
-                    places[history.name] = place
-                    histories.append(history)
+                    continue
+                histories[name] = whole
+                places.setdefault(name, place)
         raise_all(errors)
-        return histories
+        return [*histories.values()]
 
     def tables(self, path: Path, errors: list[HistoryError]) -> list[TestTable]:
         """The tables of tests in a file; HistoryError where there is none. errors : to which others are added."""
@@ -191,12 +192,25 @@ class RowPerTestReader:
         if measure := _includes_elastic(table):
             entries.setdefault("includes_elastic", SourceText(measure, location))
         rows = [TableRow(row.line, (repr(time), repr(strain), "1")) for time, strain in frames]
-        if "end_time" in cells and cells["ended"].entry.text == STOPPED:  # after the last frame, with its strain
+        if "end_time" in cells and "ended" not in entries:
+            what = f"'{cells['end_time'].entry.key}' {UNSAID_END}"
+            raise sheet.question(what, "ended", RUPTURED, STOPPED, line=row.line)
+        if "end_time" in cells and entries["ended"].text == STOPPED:  # after the last frame, with its strain
             last = cells["end_time"].seconds()
             rows += [TableRow(row.line, (repr(last), repr(frames[-1][1]), "0"))] * (last > frames[-1][0])
         columns = ("time_s", "strain_1", "used")
         text = CellTable(sheet.path, rows, sheet.sheet, columns=columns, columns_line=row.line)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
+
+
+def _with_rate_of_another(one: History, other: History) -> History | None:
+    """A test whose minimum rate and whose curve or end stand in two tables; None where both state one of them."""
+    rates = [test for test in (one, other) if test.minimum_rate is not None and not (test.outputs or test.end_known)]
+    if len(rates) != 1 or one.condition != other.condition:
+        return None
+    (rest,) = (test for test in (one, other) if test is not rates[0])
+    stated = {"minimum_rate": rates[0].minimum_rate, "minimum_rate_sd": rates[0].minimum_rate_sd}
+    return rest.replace(**stated, labels={**rates[0].labels, **rest.labels}) if rest.minimum_rate is None else None
 
 
 TEST_TABLE = RowPerTestReader(

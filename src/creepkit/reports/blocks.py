@@ -292,7 +292,7 @@ def typeset(text: str) -> str:
     return _UNIT.sub("\u00a0", _INFINITE.sub("∞", _MINUS.sub("−", text)))
 
 
-_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)
+_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?!\w|\.\d)", re.ASCII)
 """A number as programs print it, such as 4.2e-05."""
 
 
@@ -367,10 +367,11 @@ def _answer_lines(answer: Answer) -> list[str]:
     end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
     tests, _, misfits = answer.tests.partition("; ")
-    for intervals, said_of_tests, kept in (
-        *(((True, answer.tests, 1),) if misfits else ()),
-        *((one, tests, 1) for one in (True, False)),
-        *((one, tests, 0) for one in (True, False)),
+    for intervals, said_of_tests, kept, fewest in (
+        *(((True, answer.tests, 1, 1),) if misfits else ()),
+        *((one, tests, 1, 1) for one in (True, False)),
+        *((one, tests, 0, 1) for one in (True, False)),
+        (False, tests, 0, 0),
     ):
         head = _indented(f"{answer.headline} ({said_of_tests})" if said_of_tests else answer.headline, "")
         pieces = [
@@ -382,7 +383,7 @@ def _answer_lines(answer: Answer) -> list[str]:
         law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
         said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
         remarks = [*map(_indented, answer.remarks)]
-        for parts, least in ((warned, 1), (said, 1), (remarks, kept), *[(said, 0)] * (not intervals)):
+        for parts, least in ((warned, 1), (said, 1), (remarks, kept), (said, fewest)):
             while len(parts) > least and sum(map(len, (head, *remarks, law, *said, *warned, end))) > MOST_LINES:
                 parts.pop()
         lines = [*head, *chain(*remarks), *law, *chain(*said, *warned), *end]

@@ -17,6 +17,7 @@ from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends, plural, plural_of
 from creepkit.reports.verdicts import cause_headline
+from creepkit.reports.wording import first_kind, say
 from creepkit.reports.words import FITS, HEADLINES, MEAN_MISFIT, MISSES, ONE_TEST, TRUTHS
 
 if TYPE_CHECKING:
@@ -155,11 +156,16 @@ def headline_kind(fit: Identification) -> str:
     """Which of HEADLINES is said of a law."""
     items, in_tests = Description.of(fit).items(), fit.adequacy is not None and fit.adequacy.lies_in_tests
     good, bad = _usable(items), _usable(items, False)
-    if not (fit.converged or in_tests):  # a cause goes before the search
-        return "not found"
-    if not good:
-        return "use nothing" if bad else "fitted"
-    return "use in part" if bad else "use only" if rejected(fit) and not in_tests else "use"
+    return first_kind(
+        {
+            "not found": not (fit.converged or in_tests),  # a cause goes before the search
+            "use in part": good and bad,
+            "use nothing": bad,
+            "fitted": not good,
+            "use only": rejected(fit) and not in_tests,
+            "use": True,
+        }
+    )
 
 
 def headline_role(fit: Identification) -> str:
@@ -202,14 +208,9 @@ def _truth(fit: Identification) -> str:
     """Whether the law could be the true one."""
     adequacy = fit.adequacy
     if adequacy is None or adequacy.verdict == "cannot be judged":
-        kind = "not judged"
-    elif adequacy.explains:
-        kind = "explains"
-    elif adequacy.lies_in_tests:
-        return TRUTHS["in tests"].format(cause=cause_headline(adequacy.explanations[0]))
-    else:
-        kind = "rejected"
-    return TRUTHS[kind]
+        return TRUTHS["not judged"]
+    kind = first_kind({"explains": adequacy.explains, "in tests": adequacy.lies_in_tests, "rejected": True})
+    return say(TRUTHS[kind], cause="".join(map(cause_headline, adequacy.explanations[:1])))
 
 
 def _spread(ratios: list[float]) -> float:

@@ -39,6 +39,10 @@ DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence\b")
 """In the title of a law with temperature, which its equation shows."""
 
 
+FIXED = re.compile(r" with \w+=[\w.+-]+(, \w+=[\w.+-]+)*$")
+"""At its end: what was fixed, which the name beside its equation says."""
+
+
 def title_in_sentence(law: CreepLaw) -> str:
     """The title of a law within a sentence: without abbreviations in brackets, and what follows a colon.
 
@@ -53,7 +57,7 @@ class LawNames:
     """Names of laws in a text, replaced by titles."""
 
     def __init__(self, fits: Iterable[Identification]) -> None:
-        titles = {fit.law.name: title_in_sentence(fit.law) for fit in fits}
+        titles = {fit.law.name: FIXED.sub("", title_in_sentence(fit.law)) for fit in fits}
         shared = Counter(titles.values())
         self.titles = {  # of two of one title the name says which is meant
             name: title if shared[title] == 1 else f"{title} ({name})"

@@ -25,7 +25,7 @@ from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions
 from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.registry.reading import read_those_that_can_be
-from creepkit.reports.load_programs import kind_of_test, strain_rate
+from creepkit.reports.histories import kind_of_test, strain_rate
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.study_file import parse_study
 

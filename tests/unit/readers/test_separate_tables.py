@@ -154,3 +154,21 @@ def test_columns_of_one_table_are_not_parted(tmp_path):
     twice = [["T (°C)", "Stress (MPa)", "t_r (h)", "t_r (h)"], [600, 120, 800, 810]]
     with pytest.raises(HistoryError, match="mean the same"):
         ck.read_histories(workbook(tmp_path / "y.xlsx", {"S": twice}))
+
+
+@pytest.mark.parametrize("in_sheets", [False, True])
+def test_a_test_with_its_rate_and_its_rupture_in_two_tables_is_one(tmp_path, in_sheets):
+    of_rates = [
+        ["Test", "T (°C)", "Stress (MPa)", "min. creep rate (1/h)"],
+        ["A1", 600, 120, 1e-5],
+        ["A2", 600, 99, 4e-6],
+    ]
+    of_ends = [["Test", "T (°C)", "Stress (MPa)", "t_r (h)"], ["A1", 600, 120, 800], ["A3", 600, 80, ">9000"]]
+    sheets = {"1": of_rates, "2": of_ends} if in_sheets else {"1": beside(of_rates, of_ends)}
+    tests = {test.name: test for test in ck.read_histories(workbook(tmp_path / "x.xlsx", sheets))}
+    assert [*tests] == ["A1", "A2", "A3"]
+    assert (tests["A1"].minimum_rate, tests["A1"].rupture_time) == (pytest.approx(1e-5 / 3600), 800 * 3600)
+    of_ends[1][2] = 140
+    sheets = {"1": of_rates, "2": of_ends} if in_sheets else {"1": beside(of_rates, of_ends)}
+    with pytest.raises(HistoryError, match="test 'A1' already stands in"):
+        ck.read_histories(workbook(tmp_path / "y.xlsx", sheets))

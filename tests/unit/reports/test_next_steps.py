@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.reports.advice import LACKING, further_test, law_to_try, next_step
 from creepkit.reports.answer import codes_text, table_of_groups
 from creepkit.reports.description import NewTestInterval
-from creepkit.reports.next_steps import LACKING, further_test, law_to_try, next_step
 from creepkit.reports.words import NEXT
 
 STRESSES = np.array([80.0, 110.0, 150.0, 200.0])
