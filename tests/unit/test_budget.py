@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7391,
     "records": 2473,
     "registry": 615,
-    "reports": 6706,
+    "reports": 6718,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_880
+TESTS = 31_886
 """Lines of tests, those of plugins included, without benchmarks."""
 
 
