@@ -142,7 +142,7 @@ NEXT = {
 }
 """{kind: what to do now}."""
 
-BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
+BRACKETS = "In brackets: 95 % intervals, of one new test where it says so."
 """Below the numbers of an answer."""
 
 NEW_TEST = "{condition}, one new test"
@@ -160,7 +160,7 @@ MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
-CODES = "In {codes} (creepkit export, also for other codes)"
+CODES = "In {codes} (creepkit export)"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 ALL_DIGITS = "all digits{more}: details"
@@ -254,7 +254,7 @@ FORECAST = {
 PLATE = {
     # always
     "headline": "best law: {first} in {count} of {materials}<, {others:commas}>, for {range}<; "
-    "the tests reject it in {rejecting}>",
+    "in {rejecting} the tests reject it>",
     # of some
     "failed": "of {failed} more no law was identified",
     # the search did not converge
