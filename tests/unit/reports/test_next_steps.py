@@ -45,7 +45,7 @@ def test_a_law_without_temperature_is_told_so_before_its_tests_are_two_groups():
     """Four bars at 627 °C, and four that creep 40 times as fast for being at 727 °C."""
     hotter = [h.replace(name=f"hot {h.name}", times=h.times / 40.0, temperature=1000.0) for h in bars()]
     fit = ck.identify("norton", [*bars(), *hotter])
-    assert cautions(fit)[0] == "the tests are at 627 °C to 727 °C, and the law knows no temperature"
+    assert cautions(fit)[0] == "the tests are at 626.9 °C to 726.9 °C, and the law knows no temperature"
     assert next_step(fit) == NEXT["temperature"]
     assert not any("two groups" in one for one in cautions(fit))
 
