@@ -38,10 +38,10 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7406,
+    "readers": 7424,
     "records": 2473,
     "registry": 615,
-    "reports": 6706,
+    "reports": 6713,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_896
+TESTS = 31_918
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -319,6 +319,7 @@ def _time_and_end(
             end, asked = {INTERRUPTED: STOPPED, LABEL: ""}.get(end, end), label if asks and end == UNCLEAR else asked
         else:
             (end,) = ends_in_column(label, [text], conditions.end_terms, [False]).ends
+            end = RUPTURED if label.startswith("line ") and _tells_rupture(text) else end
         firmness = firm if kind in FIRM or at == "last" else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
@@ -347,6 +348,17 @@ def _time_and_end(
 
 _HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?|ore|horas)(?!\w)", re.IGNORECASE)
 """A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
+
+
+def _tells_rupture(text: str) -> bool:
+    """Whether a line of its own says that the test broke, and no more than that or when."""
+    first = re.split(r"[,;] ", text)[0]
+    is_short = _HOURS.search(first) or len(text.split()) <= MOST_WORDS
+    return bool(is_short) and kind_of_column(_HOURS.sub("", first)) == RUPTURED
+
+
+MOST_WORDS = 3
+"""Of a line without a time: longer ones are about something else."""
 
 
 AT_LAST_FRAME = 0.01

@@ -93,6 +93,11 @@ class StatedNumber:
     unit: str = ""
 
 
+def is_control(text: str) -> bool:
+    """Whether a text says what was held, such as `constant load`."""
+    return any(pattern.search(text.casefold()) for pattern in _HELD.values())
+
+
 class StatedConditions:
     """The entries of one test: numbers, texts, geometry and labels; numbers and texts are taken, one by one.
 

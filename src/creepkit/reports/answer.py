@@ -270,7 +270,7 @@ def _reason_of_bounds(one: Any) -> str:
 def _of_mean(name: str, at: str, value: Any, unit: str, one: Any, count: int) -> KeyFigure:
     """count : of tests that ruptured or ran out, from which it is."""
     low, high = known_bounds(one)
-    remark = f"mean of methods, {plural(count, 'rupture test')}{', extrapolated' * bool(one.extrapolation)}"
+    remark = f"{plural(count, 'rupture test')}{', extrapolated' * bool(one.extrapolation)}"
     remark = "; ".join(filter(None, (remark, _reason_of_bounds(one))))
     return KeyFigure(name, f"{celsius_text(one.temperature, digits=0)}, {at}", value, low, high, unit, remark)
 

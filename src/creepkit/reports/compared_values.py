@@ -86,10 +86,7 @@ OWN_RATE_CHI_SQUARE = (
 """What the chi-square of a test is, wherever one is shown."""
 
 
-LAW_RATE_MISFIT = "mean square misfit over noise² with the law's rate for every test"
-
-
-LAW_RATE_MEANING = f"{LAW_RATE_MISFIT} holds the scatter between tests"
+LAW_RATE_MEANING = "mean square misfit over noise² with the law's rate for every test holds the scatter between tests"
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,12 +71,9 @@ class Description:
         known = [(f"rupture times{lost}", self.ruptures), ("minimum creep rates", self.minimum_rates)]
         known += [("creep rates", self.rates)]
         order = sorted(self.outputs, key=lambda name: not is_logarithmic(name))
-        known += [(plural_of(name), _as_ln(name, self.outputs[name])) for name in order]
+        as_ln = {name: error if is_logarithmic(name) else np.log1p(error) for name, error in self.outputs.items()}
+        known += [(plural_of(name), float(as_ln[name])) for name in order]
         return [(name, value) for name, value in known if np.isfinite(value)][:MOST_DESCRIBED]
-
-
-def _as_ln(output: str, error: float) -> float:
-    return error if is_logarithmic(output) else float(np.log1p(error))
 
 
 def spread_text(spread: float) -> str:

@@ -260,15 +260,16 @@ def _table_of_tests(fit: Identification) -> Table:
         *("rate × law", "minimum rate, %/h", "by the law, %/h", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
-    caption = (
-        f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
-        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture"
-    )
-    if any(t.minimum_rate or t.rupture for t in fit.tests):
-        caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
-    if any(t.rupture and not t.rupture.used for t in fit.tests):
-        caption += "; the law was identified without the ends of some tests"
-    return Table(caption, columns, rows)
+    of_curves = "relative squared error and offset of the first output with the law's rate; a dash: no value is "
+    of_lives = "> marks tests that were stopped; in brackets: 95 % intervals of a single test"
+    without_ends = any(t.rupture and not t.rupture.used for t in fit.tests)
+    captions = {
+        f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}": readings is not None,
+        f"{of_curves}predicted at some readings, as after a rupture": any(t.outputs for t in fit.tests),
+        f"{of_lives}{_if_the_law_holds(fit)}": any(t.minimum_rate or t.rupture for t in fit.tests),
+        "the law was identified without the ends of some tests": without_ends,
+    }
+    return Table(". ".join(f"{one[0].upper()}{one[1:]}" for one, said in captions.items() if said), columns, rows)
 
 
 def _sums(fit: Identification) -> list[str]:

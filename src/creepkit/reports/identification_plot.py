@@ -200,7 +200,7 @@ def draw_curve(
     from matplotlib.collections import PolyCollection
 
     # beyond the strains of the test a curve towards rupture says nothing of its frames
-    end = _drawn_end(curve) if curve.logarithmic else np.inf
+    end = _drawn_end(curve)
     axes.add_collection(PolyCollection(curve.bands(end), color=colour, alpha=opacity, lw=0), autolim=False)
     axes.plot(curve.hours, np.where(curve.identified <= end, curve.identified, np.nan), style, lw=1.2, color=colour)
 
@@ -208,7 +208,7 @@ def draw_curve(
 def _drawn_end(curve: TestCurve) -> float:
     """The strain, %, at which the curve of a test ends; infinite where no strain above zero was measured."""
     largest = float(np.nanmax(curve.measured, initial=0.0))
-    return DRAWN_STRAIN_RATIO * largest if largest > 0 else float("inf")
+    return DRAWN_STRAIN_RATIO * largest if curve.logarithmic and largest > 0 else float("inf")
 
 
 def _draw_curves(
@@ -224,14 +224,9 @@ def _draw_curves(
     axes.set(xlabel="time, h", ylabel=drawn[0].label)
 
 
-def _drawn_values(curve: TestCurve) -> Floats:
-    """(frames,) the identified values that are drawn."""
-    return curve.identified[curve.identified <= _drawn_end(curve)] if curve.logarithmic else curve.identified
-
-
 def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> None:
     """Axes from the measured and identified values of what is drawn of an output."""
-    values = np.concatenate([v for c in drawn for v in (c.measured, _drawn_values(c))])
+    values = np.concatenate([v for c in drawn for v in (c.measured, c.identified[c.identified <= _drawn_end(c)])])
     largest, logarithmic = float(np.nanmax(values, initial=0.0)), all(one.logarithmic for one in drawn)
     if logarithmic and largest > 0:
         shown = values[values >= SHOWN_STRAIN_RATIO * largest]
@@ -239,7 +234,8 @@ def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> Non
     else:
         span(axes, "y", values, zero=True, most=8)
     hours = np.concatenate([c.hours for c in drawn])
-    set_time_range(axes, hours, logarithmic=logarithmic or output.startswith("stress"))
+    logarithmic |= output.startswith("stress")  # where creep spans decades of time: also stresses that relax
+    set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)
 
 
 # ---- tests one by one ------------------------------------------------------------------------------------------------
@@ -507,8 +503,3 @@ def axis_label(output: str, history: History) -> str:
     """Name and unit of an output."""
     side = "compressive " * (is_logarithmic(output) and side_of(history) < 0)
     return side + ", ".join(filter(None, (output.replace("_", " "), shown_unit(output)[1])))
-
-
-def set_time_range(axes: Axes, hours: Floats, *, logarithmic: bool) -> None:
-    """Logarithmic where creep spans decades of time: strains, and stresses that relax. hours : (readings,)."""
-    set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)

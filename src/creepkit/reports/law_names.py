@@ -39,8 +39,8 @@ DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence\b")
 """In the title of a law with temperature, which its equation shows."""
 
 
-FIXED = re.compile(r" with \w+=[\w.+-]+(, \w+=[\w.+-]+)*$")
-"""At its end: what was fixed, which the name beside its equation says."""
+FIXED = re.compile(r" with \w+=[\w.+-]+(, \w+=[\w.+-]+)*(?= \+ |$)")
+"""At the end of a term: what was fixed, which the name beside its equation says."""
 
 
 def title_in_sentence(law: CreepLaw) -> str:

@@ -212,7 +212,7 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
             ends = [[max(predicted - low, 0.0)], [max(high - predicted, 0.0)]]
             axes.errorbar(measured, predicted, yerr=ends, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     if any(r.censored for r, _ in ruptures):
-        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke later, if at all")
+        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped before rupture")
     axes.set(xlabel="measured time to rupture, h", ylabel="predicted time to rupture, h")
     place_legend(axes, below=True)
     axes.set_title("bars: 95 % of a single test, if the law is right", fontsize=9)

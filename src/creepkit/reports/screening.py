@@ -92,17 +92,13 @@ def summary_lines(plate: ScreeningResult) -> list[str]:
                 f"{law} {100 * fraction:.0f} %" for law, fraction in sorted(law_fractions.items(), key=lambda p: -p[1])
             )
             lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
-    lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
+    for alloy, why in plate.failures.items():  # after the alloy's name where it does not say it itself
+        lines.append(f"failed: {why}" if f"'{alloy}'" in why else f"failed: alloy '{alloy}': {why}")
     for result in plate.identified:
         error = result.best.numerical_error
         if error is not None and not error.confirms:
             lines.append(f"{result.alloy}: not confirmed: {numerical_error_text(error)}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
-
-
-def _failure_text(alloy: str, failure: str) -> str:
-    """The reason, after the alloy's name where it does not say it itself."""
-    return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"
 
 
 LAWS_HEIGHT = 4.4

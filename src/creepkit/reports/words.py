@@ -45,6 +45,8 @@ TRUTHS = {
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
 CAUTIONS = {
+    # tests at several temperatures, and a law that has none
+    "no temperature": "the tests are at {low:C} to {high:C}, and the law knows no temperature",
     # a value lies within 0.1 % of a bound of its search that is not physical
     "held": "{law} is held at {name} = {value}, the {end} bound of its search; to go on, write {wider}",
     # the search did not converge
@@ -104,6 +106,8 @@ NEXT = {
     "check temperature": "check the temperature of {one.tests[0]}",
     # nothing so simple would
     "check record": "check the record of {one.tests[0]}",
+    # tests are at several temperatures, and the law has none
+    "temperature": "give the law a temperature: ck.with_arrhenius(law, tests)",
     # the search did not converge
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study)< and bounds for {names}>",
     # the law is rejected, and one that was not tried has what it lacks
@@ -138,7 +142,7 @@ NEXT = {
 }
 """{kind: what to do now}."""
 
-BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
+BRACKETS = "In brackets: 95 % intervals, of one new test where it says so."
 """Below the numbers of an answer."""
 
 NEW_TEST = "{condition}, one new test"
@@ -156,7 +160,7 @@ MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
-CODES = "In {codes} (creepkit export, also for other codes)"
+CODES = "In {codes} (creepkit export)"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 ALL_DIGITS = "all digits{more}: details"
@@ -250,7 +254,7 @@ FORECAST = {
 PLATE = {
     # always
     "headline": "best law: {first} in {count} of {materials}<, {others:commas}>, for {range}<; "
-    "the tests reject it in {rejecting}>",
+    "in {rejecting} the tests reject it>",
     # of some
     "failed": "of {failed} more no law was identified",
     # the search did not converge
@@ -343,16 +347,12 @@ CAUSES = {
 """{kind: why tests reject a law, or which of them do}, in a headline."""
 
 CAUSES_AT_LENGTH = {
-    # as above
     "one test": "test '{one.tests[0]}' ({one.condition}) creeps {factor:.3g} times as fast as the others say"
     "< (or '{near}' is to blame)><; it would agree with them {errors}><; without it {without}>",
-    # as above
     "tests": "tests {one.tests:quoted} creep {one.factors:factors} times as fast as the others say"
     "<; without it {without}>",
-    # as above
     "groups": "tests ({one.tests:six}) creep {factor:.3g} times as fast as the others at equal conditions: "
     "are they of one material?",
-    # as above
     "stated groups": "{cause} at equal conditions ({one.label}: {one.tests:six})",
     # the exponent or the energy
     "changes": "{cause}, more than this law lets it",
@@ -542,11 +542,9 @@ SIZES = {
     "length": "a {what} {size:.2g} % {smaller}< in {each}>",
     # of temperature
     "drifts": "independent drifts of the temperature of up to {amount} over {where}",
-    # as above
     "drift": "a drift of the temperature of {amount} over {where}",
     # of readings
     "offsets": "independent offsets of up to {amount} in the {what} of {where}",
-    # as above
     "offset": "an offset of {amount} in the {what} of {where}",
 }
 """{kind: a perturbation with the size that it takes}; plural where each test has its own."""
