@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7424,
     "records": 2473,
     "registry": 615,
-    "reports": 6713,
+    "reports": 6710,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,

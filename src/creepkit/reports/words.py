@@ -166,10 +166,7 @@ CODES = "In {codes} (creepkit export)"
 ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
 
-CONSTANT_LOAD = (
-    "under a constant load the true stress rises with strain, here by up to {growth}: "
-    "the interval of the stress exponent rests on the form of the law too"
-)
+CONSTANT_LOAD = "a constant load lets the true stress rise, by up to {growth}: the interval rests on the law's form too"
 """Beside the exponent of such tests."""
 
 COMPARED = {
@@ -347,12 +344,16 @@ CAUSES = {
 """{kind: why tests reject a law, or which of them do}, in a headline."""
 
 CAUSES_AT_LENGTH = {
+    # as above
     "one test": "test '{one.tests[0]}' ({one.condition}) creeps {factor:.3g} times as fast as the others say"
     "< (or '{near}' is to blame)><; it would agree with them {errors}><; without it {without}>",
+    # as above
     "tests": "tests {one.tests:quoted} creep {one.factors:factors} times as fast as the others say"
     "<; without it {without}>",
+    # as above
     "groups": "tests ({one.tests:six}) creep {factor:.3g} times as fast as the others at equal conditions: "
     "are they of one material?",
+    # as above
     "stated groups": "{cause} at equal conditions ({one.label}: {one.tests:six})",
     # the exponent or the energy
     "changes": "{cause}, more than this law lets it",
@@ -542,9 +543,11 @@ SIZES = {
     "length": "a {what} {size:.2g} % {smaller}< in {each}>",
     # of temperature
     "drifts": "independent drifts of the temperature of up to {amount} over {where}",
+    # as above
     "drift": "a drift of the temperature of {amount} over {where}",
     # of readings
     "offsets": "independent offsets of up to {amount} in the {what} of {where}",
+    # as above
     "offset": "an offset of {amount} in the {what} of {where}",
 }
 """{kind: a perturbation with the size that it takes}; plural where each test has its own."""
