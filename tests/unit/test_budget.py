@@ -38,10 +38,10 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7373,
+    "readers": 7424,
     "records": 2473,
     "registry": 615,
-    "reports": 6701,
+    "reports": 6710,
     "rupture_assessment": 1825,
     "sampling": 952,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_881
+TESTS = 31_935
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

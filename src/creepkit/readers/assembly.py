@@ -102,6 +102,7 @@ def assemble_history(
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
     _take_height(conditions, name)
+    conditions.ask_of_notch()
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = up_to_rupture(conditions, from_loading_on(conditions, frames), name)
@@ -214,6 +215,7 @@ def assemble_without_frames(
     """
     known = vocabulary.terms(specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
+    conditions.ask_of_notch()
     rate_known = conditions.states("minimum_rate")
     time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)
     end = conditions.take_number("end_time")
@@ -317,6 +319,7 @@ def _time_and_end(
             end, asked = {INTERRUPTED: STOPPED, LABEL: ""}.get(end, end), label if asks and end == UNCLEAR else asked
         else:
             (end,) = ends_in_column(label, [text], conditions.end_terms, [False]).ends
+            end = RUPTURED if label.startswith("line ") and _tells_rupture(text) else end
         firmness = firm if kind in FIRM or at == "last" else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
@@ -345,6 +348,17 @@ def _time_and_end(
 
 _HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?|ore|horas)(?!\w)", re.IGNORECASE)
 """A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
+
+
+def _tells_rupture(text: str) -> bool:
+    """Whether a line of its own says that the test broke, and no more than that or when."""
+    first = re.split(r"[,;] ", text)[0]
+    is_short = _HOURS.search(first) or len(text.split()) <= MOST_WORDS
+    return bool(is_short) and kind_of_column(_HOURS.sub("", first)) == RUPTURED
+
+
+MOST_WORDS = 3
+"""Of a line without a time: longer ones are about something else."""
 
 
 AT_LAST_FRAME = 0.01

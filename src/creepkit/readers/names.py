@@ -171,7 +171,14 @@ NAMES_OF: Mapping[str, tuple[str, ...]] = {
     "label laboratory": ("laboratory", "lab", "labor", "laboratoire", "laboratorio"),
     "label operator": ("prüfer", "tester", "operatore", "operador"),
     "label elongation_pct": (
-        *("rupture elongation", "elongation at rupture", "bruchdehnung", "bruchdehnung a", "zeitbruchdehnung"),
+        *(
+            "rupture elongation",
+            "elongation at rupture",
+            "elongation after fracture",
+            "bruchdehnung",
+            "bruchdehnung a",
+            "zeitbruchdehnung",
+        ),
         *("allongement à rupture", "allungamento a rottura", "alargamiento a rotura", "伸び", "rek bij breuk"),
         *("breukrek",),
     ),

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from creepkit.readers.columns_of_tests import (
     SEARCHED,
+    TEXTS,
     column_called,
     head_of_tests,
     is_measured,
@@ -94,7 +95,8 @@ def _rows_of_all(table: CellTable, lines: Sequence[int]) -> list[TableRow]:
 def _starts_of_tables(table: CellTable, meant: Mapping[str, str], width: int) -> list[int]:
     """Columns with which tables side by side may begin: behind a blank one, or where a quantity comes again.
 
-    A stress or temperature between a result and what comes again begins the next table, if the one before has another.
+    Names, stresses or temperatures between a result and what comes again begin the next table, if the one before has
+    others.
     """
     quantities = [_quantity_of_column(table, k, meant) for k in range(width)]
     blank, starts = [_is_blank(table.rows, k) for k in range(width)], [0]
@@ -103,7 +105,7 @@ def _starts_of_tables(table: CellTable, meant: Mapping[str, str], width: int) ->
         if blank[k - 1] and not blank[k]:
             starts.append(k)
         elif quantities[k] and quantities[k] in seen:
-            while quantities[start - 1] in _CONDITIONS and {*seen[: start - k - 1]} & _CONDITIONS:
+            while quantities[start - 1] in ("name", *_CONDITIONS) and {*seen[: start - k - 1]} & _CONDITIONS:
                 start -= 1
             starts.append(start)
     return starts
@@ -118,11 +120,11 @@ def _is_blank(rows: Sequence[TableRow], k: int) -> bool:
 
 
 def _quantity_of_column(table: CellTable, k: int, meant: Mapping[str, str]) -> str:
-    """The quantity that the text nearest above the first number of a column names; of a column of texts the first."""
+    """The quantity that the text nearest above the first number of a column names; of a column of texts its name."""
     found = list[str]()
     for row in table.rows[:SEARCHED]:
         cell = row.cells[k] if k < len(row.cells) else ""
         if found and cell and is_measured(cell, table.dialect):
             return found[-1]
         found += [one] if cell and (one := column_called(meant.get(cell, cell)).quantity) else []
-    return found[0] if found else ""
+    return next((one for one in found if one in TEXTS), "".join(found[:1]))

@@ -34,6 +34,7 @@ from creepkit.files.time_stamps import (
     resolve,
     through_midnight,
 )
+from creepkit.readers.conditions import is_control
 from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
@@ -60,6 +61,7 @@ STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "micro
 
 
 _VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
+_NOTED = re.compile(r"(.*[^\s(])\s*\(([^()]*[^\W\d_]{3}[^()]*)\)")
 
 
 def in_standard_names(
@@ -131,9 +133,13 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
             moduli.append(replace(entry, text=f"{at} = {entry.text} {unit}".strip(), key=entry.key or key))
             continue
         found = split_unit(known.vocabulary.synonyms.get(key, name), known.conditions.kinds)
-        if found and (match := _VALUE_WITH_UNIT.fullmatch(without_uncertainty(entry.text))):
+        value, note = _without_note(without_uncertainty(entry.text)) if found else (entry.text, "")
+        if found and (match := _VALUE_WITH_UNIT.fullmatch(value)):
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
+                if note:
+                    control = found[0] == "stress" and is_control(note)
+                    stated.setdefault("control" if control else f"label {key} (note)", replace(entry, text=note))
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
         if name == "strain_measure":
             said = [STATED_BY_NAME.get(f"{words_of(entry.text)}{rest}", ("", "")) for rest in ("", " strain")]
@@ -146,6 +152,12 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
     if moduli:
         stated["modulus_by_temperature"] = replace(moduli[0], text="; ".join(one.text for one in moduli))
     return stated
+
+
+def _without_note(text: str) -> tuple[str, str]:
+    """A value, and what stands in brackets behind its unit, `180 MPa (constant load)`; "" where nothing does."""
+    match = _NOTED.fullmatch(text)
+    return (match[1], match[2]) if match else (text, "")
 
 
 def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:

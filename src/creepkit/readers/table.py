@@ -264,16 +264,25 @@ _THOUSANDS, _WITH_SIGN = (
 """By a sign, numbers with it, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
 
 
+_WITH_BOTH = re.compile(r"[<>≥(\[]*\s*\d{1,3}(?:(?:\.\d{3})+,|(?:,\d{3})+\.)\d+")
+"""A number that tells which sign stands between thousands, `1.234,5`."""
+
+
 def _without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
     """The table without the signs between thousands of its numbers, a comma where its decimal sign is a point.
 
-    They are if the decimal sign is stated (is_stated), or if several numbers have a comma, each before three digits; a
-    single one is asked about.
+    They are if the decimal sign is stated (is_stated), if another number has both signs, or if several numbers have a
+    comma, each before three digits; a single one is asked about.
     """
+    both = next((cell for row in table.rows for cell in row.cells if _WITH_BOTH.fullmatch(cell)), "")
+    if both and not table.sheet:  # in which cells of numbers have points
+        table = replace(table, dialect=replace(table.dialect, decimal=max(".,", key=both.rfind)))
     sign = "," if table.dialect.decimal == "." else "."
     signed = [(row, cell) for row in table.rows for cell in row.cells if sign in cell]
     found = [(row, cell) for row, cell in signed if _THOUSANDS[sign].fullmatch(cell)]
     others = [c for _, c in signed if _WITH_SIGN[sign].fullmatch(c) and not _THOUSANDS[sign].fullmatch(c)]
+    others = [c for c in others if not _WITH_BOTH.fullmatch(c)]
+    is_stated |= bool(both)
     if not found or others or (sign == "." and not is_stated):
         return table
     row, cell = found[0]

@@ -26,7 +26,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
@@ -81,7 +81,18 @@ def tables_of(path: Path, meant: Mapping[str, str]) -> list[CellTable]:
     """The tables in a text file, or in the sheets of a spreadsheet; meant : as of `separate_tables`."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
     tables = read_sheets(path) if is_spreadsheet else [read_text_table(path)]
-    return [one_row_a_test(one) for table in tables for one in separate_tables(table, meant)]
+    separate = [one for table in tables for one in separate_tables(_turned(table, meant), meant)]
+    return [one_row_a_test(one, meant) for one in separate]
+
+
+def _turned(table: CellTable, meant: Mapping[str, str]) -> CellTable:
+    """A table of tests in columns with its columns as rows, which places tell; any other table as it is."""
+    if not stands_in_columns(table, meant) or head_of_tests(table, meant):
+        return table
+    columns = zip_longest(*(row.cells for row in table.rows), fillvalue="")
+    sheet = f"{table.sheet} (columns as rows)".strip()
+    rows = [TableRow(number, cells) for number, cells in enumerate(columns, 1) if any(cells)]
+    return replace(table, rows=rows, sheet=sheet, merged=frozenset()).assuming("each column is a test")
 
 
 @dataclass(frozen=True)
@@ -109,7 +120,7 @@ class RowPerTestReader:
 
     def _is_table(self, table: CellTable) -> bool:
         meant = self.vocabulary.synonyms
-        first = one_row_a_test(separate_tables(table, meant)[0])
+        first = one_row_a_test(separate_tables(table, meant)[0], meant)
         return head_of_tests(first, meant) is not None or stands_in_columns(first, meant)
 
     def read(self, path: Path) -> list[History]:
@@ -141,10 +152,6 @@ class RowPerTestReader:
         meant = self.vocabulary.synonyms
         found = [(table, head_of_tests(table, meant)) for table in tables_of(path, meant)]
         if not any(head for _, head in found):
-            for table, _ in found:
-                if stands_in_columns(table, meant):
-                    what = "each test stands in a column; transpose the table, so that each stands in a row"
-                    raise HistoryError(f"{table.place}: {what}")
             raise HistoryError(
                 f"{path}: no row names the columns of tests; name a stress or temperature, and a rate or a time, such "
                 "as stress_MPa,temperature_C,rupture_h"
@@ -488,10 +495,10 @@ _DEEPEST, _SEARCHED = 4, 60
 """Rows of a head; and within which the matrix must begin."""
 
 
-def one_row_a_test(table: CellTable) -> CellTable:
+def one_row_a_test(table: CellTable, meant: Mapping[str, str]) -> CellTable:
     """A matrix of rupture times as a table with one row a test; any other table as it is."""
     rows, dialect = table.rows, table.dialect
-    for at, row in enumerate(rows[:_SEARCHED]):
+    for at, row in enumerate(() if head_of_tests(table, meant) else rows[:_SEARCHED]):
         above = [cell for one in rows[max(0, at - _DEEPEST) : at] for cell in one.cells if cell]
         is_named = not is_number_like(row.cells[0], dialect)  # the row of an axis; a test begins with a number
         is_axis = any(len(_axis(row.cells[1:], kind)[0]) > 1 for kind in _AXES.values())

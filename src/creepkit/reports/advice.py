@@ -11,8 +11,10 @@ import numpy as np
 from creepkit.inverse.history_checks import LENGTHS_BY_DEFAULT
 from creepkit.inverse.nuisance_parameters import beyond_intervals
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
+from creepkit.inverse.reference_conditions import spans_temperatures
 from creepkit.inverse.uncertainty.correlation import LOOSE
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
+from creepkit.language import temperature
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text, time_text
@@ -52,7 +54,9 @@ def cautions(fit: Identification, ranking: Ranking | None = None, quality: DataQ
     """What to mind, the most serious first, a sentence each without a full stop."""
     others = [one.fit for one in ranking.laws if one.fit is not fit] if ranking is not None else []
     choice = [*_choice(ranking)]  # whose first sentence stands on the first screen
-    tests = [*(one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)), *_of_tests(fit)]
+    tests = [one for one in fit.notes if one.startswith(LENGTHS_BY_DEFAULT)]
+    # of which tests of several temperatures would be groups
+    tests += [_temperatures(fit)] if _is_without_temperature(fit) else _of_tests(fit)
     of_law = [*tests, *_held([fit]), *choice[:1], *_contradictions(fit), *choice[1:], *_precision(fit)]
     return list(dict.fromkeys([*of_law, *(_held(others) if rejected(fit) else ()), *_data(quality)]))
 
@@ -63,6 +67,16 @@ def _of_tests(fit: Identification) -> Iterator[str]:
     yield from (
         cause_caution(one) if one.kind == "one test" else cause_headline(one) for one in found if not one.is_of_law
     )
+
+
+def _is_without_temperature(fit: Identification) -> bool:
+    """Whether tests at several temperatures were identified by a law that knows none."""
+    return bool(fit.histories) and spans_temperatures(fit.histories) and not fit.law.uses(temperature)
+
+
+def _temperatures(fit: Identification) -> str:
+    low, high = fit.ranges["temperature"]
+    return say(CAUTIONS["no temperature"], low=low, high=high)
 
 
 def _held(fits: Sequence[Identification]) -> Iterator[str]:
@@ -192,8 +206,10 @@ def next_step(fit: Identification, ranking: Ranking | None = None, searched: Seq
     column = [*(one for one in unjudged if one != RUPTURE_OUTPUT), ""][0]
     law, lacks = (law_to_try(fit, [*(one.law.name for one in laws), *searched]) if rejected(fit) else None) or ("", "")
     rival, challenge = _rivals(ranking)
+    is_without = _is_without_temperature(fit)
     kind = first_kind(
         {
+            "temperature": is_without,
             "search": not fit.converged and not (adequacy is not None and adequacy.lies_in_tests),
             "check": in_tests,
             "remedy": remedies,

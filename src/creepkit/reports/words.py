@@ -45,6 +45,8 @@ TRUTHS = {
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
 CAUTIONS = {
+    # tests at several temperatures, and a law that has none
+    "no temperature": "the tests are at {low:C} to {high:C}, and the law knows no temperature",
     # a value lies within 0.1 % of a bound of its search that is not physical
     "held": "{law} is held at {name} = {value}, the {end} bound of its search; to go on, write {wider}",
     # the search did not converge
@@ -104,6 +106,8 @@ NEXT = {
     "check temperature": "check the temperature of {one.tests[0]}",
     # nothing so simple would
     "check record": "check the record of {one.tests[0]}",
+    # tests are at several temperatures, and the law has none
+    "temperature": "give the law a temperature: ck.with_arrhenius(law, tests)",
     # the search did not converge
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study)< and bounds for {names}>",
     # the law is rejected, and one that was not tried has what it lacks
@@ -162,10 +166,7 @@ CODES = "In {codes} (creepkit export)"
 ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
 
-CONSTANT_LOAD = (
-    "under a constant load the true stress rises with strain, here by up to {growth}: "
-    "the interval of the stress exponent rests on the form of the law too"
-)
+CONSTANT_LOAD = "a constant load lets the true stress rise, by up to {growth}: the interval rests on the law's form too"
 """Beside the exponent of such tests."""
 
 COMPARED = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.reports.advice import LACKING, further_test, law_to_try, next_step
+from creepkit.reports.advice import LACKING, cautions, further_test, law_to_try, next_step
 from creepkit.reports.answer import codes_text, key_figures, table_of_groups
 from creepkit.reports.description import NewTestInterval
 from creepkit.reports.identification_plot import curve_of_test, fitted_curves
@@ -45,6 +45,15 @@ def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
     assert next_step(early, searched=[one.format(law="norton") for one in LACKING["early"]]) == NEXT["within"]
     late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
     assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")
+
+
+def test_a_law_without_temperature_is_told_so_before_its_tests_are_two_groups():
+    """Four bars at 627 °C, and four that creep 40 times as fast for being at 727 °C."""
+    hotter = [h.replace(name=f"hot {h.name}", times=h.times / 40.0, temperature=1000.0) for h in bars()]
+    fit = ck.identify("norton", [*bars(), *hotter])
+    assert cautions(fit)[0] == "the tests are at 626.9 °C to 726.9 °C, and the law knows no temperature"
+    assert next_step(fit) == NEXT["temperature"]
+    assert not any("two groups" in one for one in cautions(fit))
 
 
 def test_the_test_that_tells_most_of_a_power_law_is_farthest_from_those_that_were_made(steady):
