@@ -280,7 +280,7 @@ def _sums(fit: Identification) -> list[str]:
         label = "rms distance in ln strain and ln time" if ruptures else "rms of ln strain"
         lines.append(f"{plural(len(tests), 'test')}, {sum(m.frames for m in tests)} readings: {label} {fit.rms:.3g}")
     rates = [m.minimum_rate for m in fit.tests if m.minimum_rate is not None]
-    for what, values in (("minimum rates of tests without frames", rates), ("rupture times", ruptures)):
+    for what, values in (("minimum rates of tests without curves", rates), ("rupture times", ruptures)):
         known = [one.ratio for one in values if not one.censored and math.isfinite(one.ratio)]
         inside = sum(one.low <= one.measured <= one.high for one in values if not one.censored)
         if known:
