@@ -38,7 +38,10 @@ def take_height(conditions: StatedConditions, name: str) -> None:
 
 
 def as_shortening(conditions: StatedConditions, strain: Floats) -> Floats:
-    """Strain under a stress that is stated as negative, below zero as well; strain : (frames,) -."""
+    """Strain (frames,) - under a stress that is stated as negative, below zero as well.
+
+    strain : (frames,) -.
+    """
     if strain[np.isfinite(strain)].sum() <= 0.0:
         return strain
     conditions.record_assumption("shortening is a negative strain, as its stress is negative", first=True)
