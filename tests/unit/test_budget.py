@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1217,
-    "readers": 7424,
+    "readers": 7422,
     "records": 2473,
     "registry": 615,
     "reports": 6693,
