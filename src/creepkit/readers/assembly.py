@@ -1,9 +1,4 @@
-"""One test as text becomes one History; every file layout ends here.
-
-A piece that is pressed gains area, where a bar under tension loses it. A file tells this by a word, or by negative
-stresses and strains. With e = 1 - h / h_0 of the height the logarithmic strain is -ln(1 - e), and the true stress the
-nominal one times 1 - e, which is what a law of a bar is given. The height is its gauge length, unless one is stated.
-"""
+"""One test as text becomes one History; every file layout ends here."""
 
 from __future__ import annotations
 
@@ -19,6 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
+from creepkit.readers.compression import as_compressed, as_shortening, is_compression, take_height
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -57,18 +53,7 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, words_of
 from creepkit.readers.weak_sources import with_weak_sources
-from creepkit.records import (
-    SECONDS_PER_HOUR,
-    UNKNOWN_DURATION,
-    History,
-    Loading,
-    Program,
-    RecordedLoading,
-    dimensions_of,
-    known_specimens,
-    specimen_of,
-)
-from creepkit.records.loading import held_of
+from creepkit.records import SECONDS_PER_HOUR, UNKNOWN_DURATION, History, dimensions_of, known_specimens, specimen_of
 from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.specimens.elastic_part import with_elastic_part
 
@@ -101,7 +86,7 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
-    _take_height(conditions, name)
+    take_height(conditions, name)
     conditions.ask_of_notch()
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
@@ -134,9 +119,9 @@ def assemble_history(
             "a rupture time or a minimum rate is that of tension: write the size of the stress"
         )
     if signed and "strain" in outputs and not (loading.program().values > 0.0).any():
-        outputs["strain"] = _as_shortening(conditions, outputs["strain"])
-    if "strain" in outputs and loading.quantity == "stress" and not signed and _is_compression(conditions, name):
-        loading, outputs["strain"] = _as_compressed(loading, frames.times, outputs["strain"], strain_measure)
+        outputs["strain"] = as_shortening(conditions, outputs["strain"])
+    if "strain" in outputs and loading.quantity == "stress" and not signed and is_compression(conditions, name):
+        loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
     if "strain" in outputs:
@@ -552,51 +537,3 @@ def _end_of_test(
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")
     return float(frames.times[used][-1] if used.any() else frames.times[-1]), False
-
-
-# ---- compression -----------------------------------------------------------------------------------------------------
-
-
-_COMPRESSION = re.compile(r"\bcompres(?:s(?:ion|ive|ed|ione)|i[oó]n)\b|druckkriech|stauchversuch", re.IGNORECASE)
-"""Of a test that presses, in English, French and German; a compressor disc is none."""
-
-
-_TENSION = re.compile(r"tensi|traction|trazione|tracci|zug", re.IGNORECASE)
-"""Beside them of a machine for both."""
-
-
-def _is_compression(conditions: StatedConditions, name: str) -> bool:
-    """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
-    said = (name, conditions.text_of("name"), *conditions.labels, *conditions.labels.values(), *conditions.assumed)
-    return any(_COMPRESSION.search(text) and not _TENSION.search(text) for text in said)
-
-
-def _take_height(conditions: StatedConditions, name: str) -> None:
-    """Make the height of a piece that is compressed its gauge length, where none is stated."""
-    if {"height", "gauge_length"} & conditions.geometry.keys() == {"height"} and _is_compression(conditions, name):
-        height = conditions.geometry["gauge_length"] = conditions.geometry.pop("height")
-        conditions.record_assumption(f"the height {height:g} mm is the gauge length")
-
-
-def _as_shortening(conditions: StatedConditions, strain: Floats) -> Floats:
-    """Strain (frames,) - under a stress that is stated as negative, below zero as well."""
-    if strain[np.isfinite(strain)].sum() <= 0.0:
-        return strain
-    conditions.record_assumption("shortening is a negative strain, as its stress is negative", first=True)
-    return -strain
-
-
-def _as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:
-    """The loading with the true stress, and the logarithmic shortening (frames,) -, of a piece that is compressed.
-
-    times, strain : (frames,) s and -, of which shortening may be negative; measure : "engineering" or "logarithmic".
-    """
-    known = np.isfinite(strain)
-    shortening = -strain if strain[known].sum() < 0.0 else strain
-    if measure == "engineering":
-        shortening = -np.log1p(-np.minimum(shortening, 0.99))
-    if held_of(loading) == "stress" or not known.any():
-        return loading, shortening
-    at = np.concatenate([[0.0], times[known & (times > 0.0)]])
-    grown = np.interp(at, times[known], shortening[known])
-    return RecordedLoading(Program(at, loading.program().at(at) * np.exp(-grown)), "stress", "stress"), shortening

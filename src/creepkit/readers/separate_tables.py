@@ -58,7 +58,8 @@ def _holds_numbers(row: TableRow, table: CellTable) -> bool:
 def _side_by_side(table: CellTable, meant: Mapping[str, str]) -> list[CellTable]:
     """The tables of tests beside one another in a table; else the table alone."""
     width = max(len(row.cells) for row in table.rows)
-    ends = pairwise([*_starts_of_tables(table, meant, width), width])
+    starts = _starts_of_tables(table, meant, width)
+    ends = pairwise([*starts, width]) if len(starts) > 1 else ()
     whole = [start for start, end in ends if _head_line(table, range(start, end), meant)]
     parts = [range(*ends) for ends in pairwise([0, *whole[1:], width])]
     lines = [_head_line(table, part, meant) for part in parts] if len(parts) > 1 else [0]

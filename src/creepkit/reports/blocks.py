@@ -288,12 +288,16 @@ def typeset(text: str) -> str:
 
     No line ends between a number and its unit.
     """
-    text = _POWER.sub(_with_power, text.replace(" +- ", " ± "))
+    text = _POWER.sub(_with_power, _P_VALUE.sub("\u00a0\\1\u00a0", text.replace(" +- ", " ± ")))
     return _UNIT.sub("\u00a0", _INFINITE.sub("∞", _MINUS.sub("−", text)))
 
 
 _POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?!\w|\.\d)", re.ASCII)
 """A number as programs print it, such as 4.2e-05."""
+
+
+_P_VALUE = re.compile(r"(?<=\bp) ([=<]) (?=\d)")
+"""Within "p = 0.28", where no line ends."""
 
 
 _MINUS, _INFINITE = re.compile(r"(?:^|(?<=[\[( ]))-(?=[\d∞]|inf\b)"), re.compile(r"(?:^|(?<=[\[( −]))inf\b")

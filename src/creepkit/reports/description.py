@@ -153,16 +153,10 @@ def headline_kind(fit: Identification) -> str:
     """Which of HEADLINES is said of a law."""
     items, in_tests = Description.of(fit).items(), fit.adequacy is not None and fit.adequacy.lies_in_tests
     good, bad = _usable(items), _usable(items, False)
-    return first_kind(
-        {
-            "not found": not (fit.converged or in_tests),  # a cause goes before the search
-            "use in part": good and bad,
-            "use nothing": bad,
-            "fitted": not good,
-            "use only": rejected(fit) and not in_tests,
-            "use": True,
-        }
-    )
+    if not (fit.converged or in_tests):  # a cause goes before the search
+        return "not found"
+    only = rejected(fit) and not in_tests
+    return first_kind({"use in part": good and bad, "use nothing": bad, "fitted": not good, "use only": only}) or "use"
 
 
 def headline_role(fit: Identification) -> str:

@@ -38,6 +38,7 @@ from creepkit.reports.blocks import (
     Table,
     aligned,
     as_text,
+    ends,
     first_of,
     listed,
     named,
@@ -56,6 +57,7 @@ from creepkit.reports.identification_plot import residual_caption, small_multipl
 from creepkit.reports.methods import rate_scatter_sentence
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, rupture_rows
 from creepkit.reports.verdicts import perturbation_text, remarks
+from creepkit.reports.wording import amount_text, shown_unit
 
 if TYPE_CHECKING:
     from creepkit.inverse.cross_validation import CrossValidation
@@ -240,7 +242,6 @@ def _table_of_tests(fit: Identification) -> Table:
     observations, readings = compared_observations(fit), judged_readings(fit)
     for k, test in enumerate(fit.tests):
         first, end = test.outputs[0] if test.outputs else None, test.rupture
-        unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
         rows.append(
             (
                 test.name,
@@ -249,7 +250,7 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if readings is None else number(readings.chi_square(k), 3),
                 "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
-                "–" if first is None else f"{number(first.offset, 2)}{unit}",
+                "–" if first is None else amount_text(first.offset, first.output),
                 number(test.rate_factor, 3),
                 *_single_cells(None if first is not None else test.minimum_rate, 1.0 / PERCENT_PER_HOUR),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
@@ -335,22 +336,29 @@ def _single_cells(one: SingleValue | None, unit: float) -> tuple[str, str, str]:
 # ---- noise and nuisance parameters -----------------------------------------------------------------------------------
 
 
+SMALLEST_SHARE = 5e-4
+"""Of strain, from which on it is said that the law cannot follow it."""
+
+
 def noise_blocks(fit: Identification) -> list[Block]:
     """Noise, scatter and misfits as they were estimated, explicit nuisance parameters, and correlations."""
-    rows = []
+    rows, readings = [], judged_readings(fit)
     for name, one in fit.noise_model.outputs.items():
         error = fit.errors.get(name) if name != RUPTURE_OUTPUT and not is_logarithmic(name) else None
         rms = "–" if error is None else f"{error.mean_squared_error**0.5:.3g} ({100 * error.relative_rms_error:.2g} %)"
         squared = "–" if error is None else number(error.relative_squared_error, 3)
-        sizes = {"of a reading": _judged_noise(fit, name), "in the fit": number(one.noise, 2)}
-        sizes |= {"offset of a test": number(one.offset, 2), "rms misfit": rms, "squared error": squared}
+        (factor, unit), judged = shown_unit(name), None if readings is None else readings.noise(output=name)
+        of_reading = "–" if judged is None else ends(factor * np.array(judged), 2)
+        sizes = {"of a reading": of_reading, "in the fit": number(factor * one.noise, 2)}
+        sizes |= {"offset of a test": number(factor * one.offset, 2), "rms misfit": rms, "squared error": squared}
         if {*sizes.values()} - {"–", "0"}:
-            rows.append({"output": name.replace("_", " "), "unit": output_unit(name) or "1", **sizes})
+            rows.append({"output": name.replace("_", " "), "unit": unit or "1", **sizes})
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if name := logarithmic_output(fit):
         part = fit.noise_model[name]
         share = math.hypot(RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, part.drift, part.misfit)
-        blocks.append(Paragraph(f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"))
+        text = f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"
+        blocks += [Paragraph(text)] * (share >= SMALLEST_SHARE)
     caption = (
         "noise as it was estimated, one standard deviation. Of a reading: by which the law is judged, from what "
         "its test states or its neighbours show. In the fit: one for all. Misfit and error: what the law leaves"
@@ -371,16 +379,6 @@ def noise_blocks(fit: Identification) -> list[Block]:
     ]
     tables = [Table.of(caption, rows), Table.of("nuisance parameters estimated beside the law", nuisances)]
     return [*blocks, *(table for table in tables if table.rows), *_correlations(fit)]
-
-
-def _judged_noise(fit: Identification, output: str) -> str:
-    """The noise of a reading by which the law is judged; its ends where readings differ."""
-    readings = judged_readings(fit)
-    ends = None if readings is None else readings.noise(output=output)
-    if ends is None:
-        return "–"
-    low, high = (number(end, 2) for end in ends)
-    return low if low == high else f"{low} to {high}"
 
 
 def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:

@@ -184,7 +184,6 @@ def _title(groups: Sequence[ReportGroup]) -> str:
 
 
 def _quality(histories: Sequence[History]) -> Any:
-
     try:
         return check_data_quality(histories) if histories else None
     except CreepkitError:  # of tests that only a fit can take, such as plans

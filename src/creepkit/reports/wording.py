@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import first_of
+from creepkit.reports.blocks import first_of, listed
 
 SMALLEST_SHOWN_P_VALUE, LARGEST_SHOWN_ODDS = 1e-12, 13.8
 """p-values below, and ln of odds above, are shown as such."""
@@ -49,7 +49,7 @@ def amount_text(value: float, output: str) -> str:
 FORMATS: Mapping[str, Callable[[Any], str]] = {
     "%": lambda share: f"{100 * share:.2g} %",
     "C": lambda kelvin: celsius_text(kelvin, kelvin),
-    "and": " and ".join,
+    "and": lambda names: listed(names) if names else "",
     "but": "; but ".join,
     "commas": ", ".join,
     "factors": lambda factors: " and ".join(f"{one:.3g}" for one in factors),

@@ -332,8 +332,8 @@ class DataSummary:
         units = {load_unit(history) for history in self.tests}
         loads = f"{len(self.loads)} level{'s' if several else ''} of load"
         if len(units) == 1:
-            loads += f", {self.loads[0]:g}"
-            loads += f" to {self.loads[-1]:g} {units.pop() or self.tests[0].loading.quantity}" if several else ""
+            ends = dict.fromkeys((f"{self.loads[0]:.4g}", f"{self.loads[-1]:.4g}"))
+            loads += f", {' to '.join(ends)} {units.pop() or self.tests[0].loading.quantity}"
         rates = [rate for history in self.tests if (rate := strain_rate(history)) is not None]
         if len(rates) == len(self.tests):
             loads = f"strain rates of {min(rates):.2g} to {max(rates):.2g} 1/s"
