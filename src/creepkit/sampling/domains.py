@@ -24,7 +24,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, nearest
 from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.kernels import tension_point
-from creepkit.language import CreepLaw, temperature
+from creepkit.language import CreepLaw, stress, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import ROOM_TEMPERATURE, Specimen, Status
@@ -71,9 +71,11 @@ CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 
 @lru_cache(maxsize=64)
 def constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
-    """Each constraint of a law as a function of the point, the internal variables and the author's parameters."""
+    """Each constraint of a law as a function of the point, internal variables and parameters; that it flows is one."""
     arguments = (*POINT_VARIABLES, *law.states, *law.params)
-    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
+    flowing = [stress > sympy.Add(*law.back_stresses)] if law.back_stresses else []
+    relations = (*law.constraints, *flowing)
+    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in relations)
 
 
 def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:

@@ -139,7 +139,11 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
     with suppress(LawError):  # of one with primary creep of its own
         suited += [laws[0].with_primary()] * bool(laws[0].states)
-    sums = [laws[0] + other for other in laws[1:] if not (laws[0].states and other.states)]  # a piece breaks once
+    sums = [
+        laws[0] + other
+        for other in laws[1:]
+        if not ((laws[0].states and other.states) or laws[0].back_stresses or other.back_stresses)
+    ]  # a piece breaks once, and flows along one effective stress
     free = {name for law in laws for name in law.names}
     fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}
     suited = [_with_fixed(law, fixed) for law in suited]

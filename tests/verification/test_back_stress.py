@@ -1,0 +1,194 @@
+"""Bars with a back stress against closed forms, differences, and scipy's integration of the signed equations.
+
+c' = A |s - X|^n sign(s - X),    X' = C c' - gamma X |c'| - r X
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import creepkit as ck
+from creepkit.errors import ExportError, LawError, SolveError
+from creepkit.language import CreepLaw, Param, State, parameters, principal_stress, states, stress
+from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.records import PointLoading, Program, RecordedLoading, Status
+from creepkit.records.loading import constant_load
+
+LAW = ck.law("armstrong-frederick")
+VALUES = {"A": 2e-13, "n": 4.0, "C": 2e4, "gamma": 300.0, "r": 3e-5}
+E = 1.5e5
+HOLDS = RecordedLoading(
+    Program(
+        np.array([0.0, 60, 4000, 4010, 8000, 8300, 12000, 12300, 16000, 16060, 30000]),
+        np.array([0.0, 120, 120, 30, 30, -110, -110, 100, 100, 0, 0]),
+    ),
+    "stress",
+    "load",
+)
+"""Tension, a dip below the back stress, reversals with holds, and a rest in which X falls by recovery alone."""
+STRAINS = ck.StrainSteps(((0, 1.5e-3), (4000, -1e-3), (8000, 1.2e-3), (12000, 4e-4)), ramp=100.0)
+TIMES = [30.0, 60, 200, 1000, 4000, 4005, 4100, 5000, 8000, 8200, 8300, 9000, 12000, 12500, 16000, 16050, 17000, 30000]
+LOADINGS = {"load": HOLDS, "strain": STRAINS}
+
+
+def tight(specimen, tolerance=1e-10):
+    return ck.specimen(specimen).replace(tolerance=tolerance, max_steps=20_000)
+
+
+def run(values, loading, times, kind="load", law=LAW, tolerance=1e-10):
+    specimen, more = ("uniaxial", {}) if kind == "load" else ("relaxation", {"elastic": ck.Elastic(E)})
+    return ck.simulate(law, tight(specimen, tolerance), values, loading=loading, times=times, temperature=900.0, **more)
+
+
+def integrated(values, program, kind):
+    """Axial creep strain, X and equivalent creep strain at TIMES, by Radau's method with the signed equations."""
+    A, n, C, gamma, r = (values[name] for name in ("A", "n", "C", "gamma", "r"))
+
+    def slope(t, y, begin, end, low, high):
+        driving = low + (high - low) * (t - begin) / (end - begin)
+        effective = (driving * np.exp(y[0]) if kind == "load" else E * (driving - y[0])) - y[1]
+        rate = A * abs(effective) ** n * np.sign(effective)
+        return [rate, C * rate - gamma * y[1] * abs(rate) - r * y[1], abs(rate)]
+
+    y, found = np.zeros(3), {}
+    knots = [*zip(program.times, program.values, strict=True)]
+    if knots[-1][0] < TIMES[-1]:
+        knots.append((TIMES[-1], knots[-1][1]))
+    for (begin, low), (end, high) in pairwise(knots):
+        marks = sorted({t for t in TIMES if begin < t <= end} | {end})
+        piece = solve_ivp(
+            slope, (begin, end), y, "Radau", marks, args=(begin, end, low, high), rtol=1e-10, atol=[1e-15, 1e-9, 1e-15]
+        )
+        found |= dict(zip(piece.t, piece.y.T, strict=True))
+        y = piece.y[:, -1]
+    return np.array([found[t] for t in TIMES]).T
+
+
+def test_the_back_stress_of_a_bar_under_tension_and_reversal_is_that_of_armstrong_and_frederick():
+    """X = C/gamma (1 - exp(-gamma p)), then C/gamma (2 exp(-gamma (p - p_1)) - ...) as p goes on the other way."""
+    values = VALUES | {"r": 0.0}
+    steps = ck.StressSteps(((0.0, 150.0), (5000.0, -150.0)), control="stress")
+    found = run(values, steps, np.linspace(100.0, 10000.0, 100))
+    limit, gamma, path, x = values["C"] / values["gamma"], values["gamma"], found.equivalent_strain, found.states["X"]
+    pulled = found.times <= 5000.0
+    assert x[pulled] == pytest.approx(limit * (1 - np.exp(-gamma * path[pulled])), rel=1e-8)
+    reached, p_1 = x[pulled][-1], path[pulled][-1]
+    pressed = -limit + (reached + limit) * np.exp(-gamma * (path[~pulled] - p_1))
+    assert x[~pulled] == pytest.approx(pressed, abs=1e-8 * limit)
+    assert found.outputs["strain"][~pulled] == pytest.approx(2 * p_1 - path[~pulled], rel=1e-9)
+
+
+def test_a_linear_flow_of_a_dashpot_against_a_spring_runs_out_as_an_exponential():
+    """n = 1, no recovery: c = s/C (1 - exp(-A C t)), creep that ends and comes back when the load is taken off."""
+    values = {"A": 1e-7, "n": 1.0, "C": 2e4, "gamma": 0.0, "r": 0.0}
+    steps = ck.StressSteps(((0.0, 100.0), (20000.0, 0.0)), control="stress")
+    times = np.array([10.0, 500, 2000, 20000, 20100, 22000, 40000])
+    found = run(values, steps, times)
+    rises, rate = times <= 20000.0, values["A"] * values["C"]
+    closed = 100.0 / values["C"] * np.where(rises, 1 - np.exp(-rate * times), np.exp(-rate * (times - 20000.0)))
+    assert found.status is Status.COMPLETE
+    assert found.outputs["strain"] == pytest.approx(closed, abs=1e-8 * 100.0 / values["C"])
+
+
+@pytest.mark.parametrize("n", [1.0, 4.0, 8.0])
+@pytest.mark.parametrize("kind", LOADINGS)
+def test_dips_reversals_and_rests_agree_with_scipy(kind, n):
+    values = VALUES | {"n": n, "A": VALUES["A"] * 60.0 ** (4.0 - n)}
+    found = run(values, LOADINGS[kind], TIMES, kind)
+    assert found.status is Status.COMPLETE
+    creep, x, path = integrated(values, LOADINGS[kind].program(), kind)
+    assert found.creep_strain == pytest.approx(creep, abs=1e-7 * np.abs(creep).max())
+    assert found.equivalent_strain == pytest.approx(path, rel=1e-7)
+    assert found.states["X"] == pytest.approx(x, abs=1e-7 * np.abs(x).max())
+    coarse = run(values, LOADINGS[kind], TIMES, kind, tolerance=1e-5)
+    assert coarse.creep_strain == pytest.approx(creep, abs=1e-3 * np.abs(creep).max())
+
+
+@pytest.mark.parametrize("kind", LOADINGS)
+def test_sensitivities_are_those_of_the_prediction(kind):
+    specimen = "uniaxial" if kind == "load" else "relaxation"
+    plan = ck.History("bar", np.array(TIMES), {}, LOADINGS[kind], 900.0, specimen, elastic=ck.Elastic(E))
+    theta = np.asarray(LAW.to_internal(LAW.values(VALUES))).reshape(1, -1)
+    bar = tight(specimen, 1e-11)
+    found = bar.predict(LAW, theta, [plan], sensitivities=True).jacobian[0, 0, :, 0]
+    for p, step in enumerate(np.diag(1e-3 * np.where(LAW.log_scale, 1.0, np.abs(theta[0])))):
+        near = np.concatenate([theta + step, theta - step, theta + 2 * step, theta - 2 * step])
+        up, down, further, back = bar.predict(LAW, near, [plan]).values[:, 0, :, 0]
+        numeric = (8 * (up - down) - (further - back)) / (12 * step[p])
+        assert found[:, p] == pytest.approx(numeric, abs=1e-6 * np.abs(numeric).max())
+
+
+def test_planted_values_are_found_from_tests_that_dip_and_reverse_within_their_intervals():
+    law, inside = LAW.with_bounds(n=(2, 7)), 0
+    for seed in range(2):
+        rng, tests = np.random.default_rng(seed), []
+        for first, second in ((120.0, 40.0), (150.0, -120.0), (100.0, 130.0), (135.0, 20.0)):
+            loading = ck.StressSteps(((0.0, first), (6000.0, second), (12000.0, first)), control="stress")
+            times = np.concatenate([start + np.geomspace(20.0, 6000.0, 15) for start in (0.0, 6000.0, 12000.0)])
+            strain = run(VALUES, loading, times).outputs["strain"]
+            noise = np.full(times.size, 0.005 * np.abs(strain).max())
+            noisy = {"strain": strain + noise * rng.normal(size=times.size)}
+            tests.append(ck.History(f"{first:g}", times, noisy, loading, 900.0, standard_deviation={"strain": noise}))
+        fit = ck.identify(law, tests)
+        assert fit.adequacy.explains
+        assert fit.values["n"] == pytest.approx(VALUES["n"], rel=0.1)
+        inside += sum(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
+    assert inside >= 8
+
+
+def law_of(term, rate, kind="back stress", **more):
+    A, X = parameters("A")[0], states("X")[0]
+    coefficient = Param("rate coefficient", bounds=(1e-40, 1e-3), unit="1/s", scale="log")
+    return CreepLaw(
+        "other",
+        {"flow": A * term(X)},
+        {A: coefficient},
+        states={X: State(0.0, rate(A, X), "X", "MPa", **more, kind=kind)},
+    )
+
+
+def test_what_a_back_stress_cannot_be_is_refused_in_a_sentence():
+    def grows(A, X):
+        return A * (stress - X) - X
+
+    with pytest.raises(LawError, match=r"term 'flow': stress stands beside .* takes stress as stress - X alone"):
+        law_of(lambda X: stress, grows)
+    with pytest.raises(LawError, match=r"rate of state 'X': principal_stress stands beside"):
+        law_of(lambda X: stress - X, lambda A, X: A * principal_stress)
+    with pytest.raises(LawError, match="a back stress has unit"):
+        law_of(lambda X: stress - X, grows, limit=3.0)
+    assert law_of(lambda X: stress - X, grows) != law_of(lambda X: stress - X, grows, kind="scalar")
+    assert (
+        law_of(lambda X: stress - X, grows).fingerprint
+        != law_of(lambda X: stress - X, grows, kind="scalar").fingerprint
+    )
+
+
+LOADS = {
+    "bulge": constant_load("pressure", 2.0),
+    "point": PointLoading(stress={"11": 50.0}),
+    "three-point-bend": constant_load("force", 20.0),
+    "notched-bar": constant_load("force", 20.0),
+}
+
+
+@pytest.mark.parametrize("name", LOADS)
+def test_other_specimens_refuse_a_back_stress(name):
+    more = {"loading": LOADS[name], "times": [10.0, 100.0], "temperature": 900.0, "elastic": ck.Elastic(E)}
+    with pytest.raises(SolveError, match="back stress, whose direction bars alone follow: use the specimen uniaxial"):
+        ck.simulate(LAW, name, VALUES, **more)
+
+
+def test_programs_refuse_a_back_stress_and_equations_show_it():
+    for target in ("abaqus", "mfront", "c", "javascript", "python", "ansys"):
+        with pytest.raises(ExportError, match="X|back stress"):
+            ck.export(LAW, target, VALUES)
+    assert "X" in ck.export(LAW, "latex", VALUES)
+
+
+def test_a_law_with_a_back_stress_is_kept_in_files():
+    copy = law_from_json(law_to_json(LAW))
+    assert copy == LAW
+    assert copy.back_stresses == LAW.back_stresses
