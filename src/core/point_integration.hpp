@@ -129,10 +129,10 @@ private:
         const StressControl& drive = test.drive;
         if (!drive.of_bar()) return segment;
         const double creep = work.offset + work.sign * work.value[0], growth = exp(drive.load * creep);
-        const double back = work.back_stress(work.value), rounding = ROUNDING * (drive.stiffness * work.value[0] + fabs(back));
+        const double back = work.back_stress(work.value);
+        const double rounding = ROUNDING * (drive.stiffness * work.value[0] + fabs(back));
         const double now = (segment.stress - drive.stiffness * creep) * growth - work.sign * back;
-        const double ahead =
-            fabs(now) > rounding ? now : segment.stress_rate * growth - work.sign * recovery(segment);
+        const double ahead = fabs(now) > rounding ? now : segment.stress_rate * growth - work.sign * recovery(segment);
         if (ahead * work.sign < 0.0) reverse();
         return segment.directed(work.sign * exp(drive.load * work.offset), drive.stiffness * work.offset);
     }

@@ -207,7 +207,7 @@ inline bool leaves_stress(const StageProblem& problem, double increment, const d
 inline double unknown_that_leaves_stress(const StageProblem& problem, double guess, const double* row,
                                          int64_t state_count) {
     if (!leaves_stress(problem, 0.0, row, state_count)) return NAN;
-    double x = unknown_of_increment(problem, guess);
+    double x = unknown_of_increment(problem, fmin(guess, 1.0));
     while (!leaves_stress(problem, exp(x), row, state_count)) x -= 1.0;
     return x;
 }
@@ -254,14 +254,14 @@ inline StageSolution solve_stage_with_back_stress(LawEntry update, const double*
         if (!solve_dense(matrix, step, size, 1)) return {0.0, NO_SOLUTION};
         double share = fmin(1.0, LONGEST_CORRECTION / fmax(fabs(step[0]), 1e-300));
         if (flows) share = share_that_leaves_stress(problem, x, step, row, state_count, share);
-        bool small = !(fabs(share * step[0]) > tolerance) ||
+        bool small = !(fabs(step[0]) > tolerance) ||
                      (fabs(step[0]) < SMALL && now.increment * fabs(step[0]) < negligible);
         double sum = 0.0;
         for (int64_t i = 1; i < size; ++i) {
             double& z = row[POINT_SIZE + i - 1];
             z += share * step[i];
             sum += z;
-            small = small && !(fabs(share * step[i]) > tolerance * fmax(fabs(z), 1e-12));
+            small = small && !(fabs(step[i]) > tolerance * fmax(fabs(z), 1e-12));
         }
         if (!isfinite(sum + step[0])) return {0.0, NOT_FINITE};
         x += share * step[0];

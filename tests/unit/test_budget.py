@@ -23,36 +23,36 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3331,
+    "exporters": 3341,
     "extraction": 1289,
     "fem": 1440,
     "files": 1313,
     "forecasts": 1184,
     "instruments": 1159,
-    "integration": 792,
-    "inverse": 9460,
+    "integration": 801,
+    "inverse": 9481,
     "jobs": 245,
-    "kernels": 1689,
-    "language": 1557,
+    "kernels": 1691,
+    "language": 1595,
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1217,
+    "quality": 1230,
     "readers": 7271,
     "records": 2470,
     "registry": 615,
     "reports": 6710,
     "rupture_assessment": 1825,
-    "sampling": 952,
+    "sampling": 956,
     "screening": 571,
-    "specimens": 3176,
+    "specimens": 3177,
     "studies": 2802,
     "surrogates": 1394,
     "testing": 1830,
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_756
+TESTS = 31_896
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -13,23 +13,16 @@ import creepkit as ck
 from creepkit.errors import ExportError, LawError, SolveError
 from creepkit.language import CreepLaw, Param, State, parameters, principal_stress, states, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.records import PointLoading, Program, RecordedLoading, Status
-from creepkit.records.loading import constant_load
+from creepkit.records import PointLoading, Status
+from creepkit.records.loading import constant_load, load_steps
 
 LAW = ck.law("armstrong-frederick")
 VALUES = {"A": 2e-13, "n": 4.0, "C": 2e4, "gamma": 300.0, "r": 3e-5}
 E = 1.5e5
-HOLDS = RecordedLoading(
-    Program(
-        np.array([0.0, 60, 4000, 4010, 8000, 8300, 12000, 12300, 16000, 16060, 30000]),
-        np.array([0.0, 120, 120, 30, 30, -110, -110, 100, 100, 0, 0]),
-    ),
-    "stress",
-    "load",
-)
+HOLDS = load_steps("stress", [(0, 120), (4000, 30), (8000, -110), (12000, 100), (16000, 0)], 60.0)
 """Tension, a dip below the back stress, reversals with holds, and a rest in which X falls by recovery alone."""
 STRAINS = ck.StrainSteps(((0, 1.5e-3), (4000, -1e-3), (8000, 1.2e-3), (12000, 4e-4)), ramp=100.0)
-TIMES = [30.0, 60, 200, 1000, 4000, 4005, 4100, 5000, 8000, 8200, 8300, 9000, 12000, 12500, 16000, 16050, 17000, 30000]
+TIMES = [30.0, 60, 200, 1000, 4000, 4030, 4100, 5000, 8000, 8020, 8060, 9000, 12000, 12500, 16000, 16050, 17000, 30000]
 LOADINGS = {"load": HOLDS, "strain": STRAINS}
 
 
@@ -53,14 +46,11 @@ def integrated(values, program, kind):
         return [rate, C * rate - gamma * y[1] * abs(rate) - r * y[1], abs(rate)]
 
     y, found = np.zeros(3), {}
-    knots = [*zip(program.times, program.values, strict=True)]
-    if knots[-1][0] < TIMES[-1]:
-        knots.append((TIMES[-1], knots[-1][1]))
+    options = {"method": "Radau", "rtol": 1e-10, "atol": [1e-15, 1e-9, 1e-15]}
+    knots = [*zip(program.times, program.values, strict=True), (TIMES[-1], program.values[-1])]
     for (begin, low), (end, high) in pairwise(knots):
         marks = sorted({t for t in TIMES if begin < t <= end} | {end})
-        piece = solve_ivp(
-            slope, (begin, end), y, "Radau", marks, args=(begin, end, low, high), rtol=1e-10, atol=[1e-15, 1e-9, 1e-15]
-        )
+        piece = solve_ivp(slope, (begin, end), y, t_eval=marks, args=(begin, end, low, high), **options)
         found |= dict(zip(piece.t, piece.y.T, strict=True))
         y = piece.y[:, -1]
     return np.array([found[t] for t in TIMES]).T
@@ -120,50 +110,48 @@ def test_sensitivities_are_those_of_the_prediction(kind):
         assert found[:, p] == pytest.approx(numeric, abs=1e-6 * np.abs(numeric).max())
 
 
+def measured(seed, levels, law=LAW, values=VALUES):
+    """Tests of two stresses, the first of them again at the end, with noise of 0.5 % of the largest strain."""
+    rng, tests = np.random.default_rng(seed), []
+    for first, second in levels:
+        loading = ck.StressSteps(((0.0, first), (6000.0, second), (12000.0, first)), control="stress")
+        times = np.concatenate([start + np.geomspace(20.0, 6000.0, 15) for start in (0.0, 6000.0, 12000.0)])
+        strain = run(values, loading, times, law=law).outputs["strain"]
+        noise = np.full(times.size, 0.005 * np.abs(strain).max())
+        noisy = {"strain": strain + noise * rng.normal(size=times.size)}
+        tests.append(ck.History(f"{first:g}", times, noisy, loading, 900.0, standard_deviation={"strain": noise}))
+    return tests
+
+
 def test_planted_values_are_found_from_tests_that_dip_and_reverse_within_their_intervals():
-    law, inside = LAW.with_bounds(n=(2, 7)), 0
-    for seed in range(2):
-        rng, tests = np.random.default_rng(seed), []
-        for first, second in ((120.0, 40.0), (150.0, -120.0), (100.0, 130.0), (135.0, 20.0)):
-            loading = ck.StressSteps(((0.0, first), (6000.0, second), (12000.0, first)), control="stress")
-            times = np.concatenate([start + np.geomspace(20.0, 6000.0, 15) for start in (0.0, 6000.0, 12000.0)])
-            strain = run(VALUES, loading, times).outputs["strain"]
-            noise = np.full(times.size, 0.005 * np.abs(strain).max())
-            noisy = {"strain": strain + noise * rng.normal(size=times.size)}
-            tests.append(ck.History(f"{first:g}", times, noisy, loading, 900.0, standard_deviation={"strain": noise}))
-        fit = ck.identify(law, tests)
+    inside = 0
+    for seed in range(3):
+        fit = ck.identify(LAW, measured(seed, ((120.0, 40.0), (150.0, -120.0), (100.0, 130.0), (135.0, 20.0))))
         assert fit.adequacy.explains
         assert fit.values["n"] == pytest.approx(VALUES["n"], rel=0.1)
         inside += sum(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
-    assert inside >= 8
+    assert inside >= 13
 
 
-def law_of(term, rate, kind="back stress", **more):
-    A, X = parameters("A")[0], states("X")[0]
+A, X = *parameters("A"), *states("X")
+
+
+def law_of(term, rate, **more):
     coefficient = Param("rate coefficient", bounds=(1e-40, 1e-3), unit="1/s", scale="log")
-    return CreepLaw(
-        "other",
-        {"flow": A * term(X)},
-        {A: coefficient},
-        states={X: State(0.0, rate(A, X), "X", "MPa", **more, kind=kind)},
-    )
+    return CreepLaw("other", {"flow": term}, {A: coefficient}, states={X: State(0.0, rate, "X", "MPa", **more)})
 
 
 def test_what_a_back_stress_cannot_be_is_refused_in_a_sentence():
-    def grows(A, X):
-        return A * (stress - X) - X
-
+    flow = A * (stress - X)
     with pytest.raises(LawError, match=r"term 'flow': stress stands beside .* takes stress as stress - X alone"):
-        law_of(lambda X: stress, grows)
+        law_of(A * stress, flow - X, kind="back stress")
     with pytest.raises(LawError, match=r"rate of state 'X': principal_stress stands beside"):
-        law_of(lambda X: stress - X, lambda A, X: A * principal_stress)
+        law_of(flow, A * principal_stress, kind="back stress")
     with pytest.raises(LawError, match="a back stress has unit"):
-        law_of(lambda X: stress - X, grows, limit=3.0)
-    assert law_of(lambda X: stress - X, grows) != law_of(lambda X: stress - X, grows, kind="scalar")
-    assert (
-        law_of(lambda X: stress - X, grows).fingerprint
-        != law_of(lambda X: stress - X, grows, kind="scalar").fingerprint
-    )
+        law_of(flow, flow - X, kind="back stress", limit=3.0)
+    signed, scalar = law_of(flow, flow - X, kind="back stress"), law_of(flow, flow - X)
+    assert signed != scalar
+    assert signed.fingerprint != scalar.fingerprint
 
 
 LOADS = {
@@ -181,14 +169,18 @@ def test_other_specimens_refuse_a_back_stress(name):
         ck.simulate(LAW, name, VALUES, **more)
 
 
-def test_programs_refuse_a_back_stress_and_equations_show_it():
+def test_programs_refuse_a_back_stress_and_equations_and_files_keep_it():
     for target in ("abaqus", "mfront", "c", "javascript", "python", "ansys"):
-        with pytest.raises(ExportError, match="X|back stress"):
+        with pytest.raises(ExportError, match="has a back stress"):
             ck.export(LAW, target, VALUES)
     assert "X" in ck.export(LAW, "latex", VALUES)
+    assert law_from_json(law_to_json(LAW)).back_stresses == LAW.back_stresses
 
 
-def test_a_law_with_a_back_stress_is_kept_in_files():
-    copy = law_from_json(law_to_json(LAW))
-    assert copy == LAW
-    assert copy.back_stresses == LAW.back_stresses
+def test_a_back_stress_is_proposed_where_bars_turn_or_recover_and_told_from_hardening():
+    recovering = ((120.0, 40.0), (150.0, 50.0), (100.0, 10.0), (135.0, 20.0))
+    hardening = ck.law("strain-hardening"), {"A": 1e-17, "n": 4.0, "m": -0.6}
+    assert "armstrong-frederick" not in [law.name for law in ck.candidates(measured(0, recovering, *hardening))]
+    tests = measured(0, recovering)
+    ranking = ck.select(ck.candidates(tests), tests, sums=True)
+    assert ranking.best.law.name == "armstrong-frederick"

@@ -55,8 +55,8 @@ def refuse_back_stress(law: CreepLaw) -> None:
     """ExportError, with what to do, where a law has a back stress: programs have a scalar for a state."""
     if law.back_stresses:
         raise ExportError(
-            f"law '{law.name}' has a back stress, whose direction programs do not follow; export it as latex, "
-            "markdown, mathml or json, or a law without one"
+            f"law '{law.name}' has a back stress, whose direction programs do not follow; export it as 'latex', "
+            "'markdown', 'mathml' or 'json', or a law without one"
         )
 
 

@@ -150,7 +150,7 @@ def _check_back_stresses(law: LawRecord, origin: str) -> None:
     for symbol, state in law.states.items():
         rates[f"rate of state '{symbol}'"] = state.rate, set() if symbol in own else own
     for position, (expression, excluded) in rates.items():
-        left = expression.subs(stress - sympy.Add(*law.back_stresses), effective).free_symbols
+        left = expression.subs(law.effective_stress, effective).free_symbols
         if stray := left & ({stress, principal_stress, mean_stress} | excluded):
             names = ", ".join(sorted(map(str, stray)))
             raise LawError(
@@ -311,6 +311,11 @@ class LawRecord:
     def back_stresses(self) -> tuple[sympy.Symbol, ...]:
         """Its internal variables that are back stresses."""
         return tuple(symbol for symbol, state in self.states.items() if state.kind == "back stress")
+
+    @property
+    def effective_stress(self) -> sympy.Expr:
+        """The stress along which it flows: that less its back stresses."""
+        return stress - sympy.Add(*self.back_stresses)
 
     @property
     def fingerprint(self) -> str:

@@ -24,7 +24,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, nearest
 from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.kernels import tension_point
-from creepkit.language import CreepLaw, stress, temperature
+from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import ROOM_TEMPERATURE, Specimen, Status
@@ -73,7 +73,7 @@ CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 def constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
     """Each constraint of a law as a function of the point, internal variables and parameters; that it flows is one."""
     arguments = (*POINT_VARIABLES, *law.states, *law.params)
-    flowing = [stress > sympy.Add(*law.back_stresses)] if law.back_stresses else []
+    flowing = [law.effective_stress > 0] if law.back_stresses else []
     relations = (*law.constraints, *flowing)
     return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in relations)
 

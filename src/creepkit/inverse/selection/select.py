@@ -40,8 +40,11 @@ ALIKE = 2.0
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
-    """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening."""
-    return [a + b for a, b in combinations(_distinct_laws(laws), 2)]
+    """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening.
+
+    A law with a back stress flows along a stress of its own, and is in no sum.
+    """
+    return [a + b for a, b in combinations(_distinct_laws(laws), 2) if not (a.back_stresses or b.back_stresses)]
 
 
 def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
