@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_878
+TESTS = 31_881
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

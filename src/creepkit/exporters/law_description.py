@@ -56,7 +56,7 @@ def refuse_back_stress(law: CreepLaw) -> None:
     if law.back_stresses:
         raise ExportError(
             f"law '{law.name}' has a back stress, whose direction programs do not follow; export it as 'latex', "
-            "'markdown', 'mathml' or 'json', or a law without one"
+            "'markdown' or 'mathml', or a law without one"
         )
 
 
