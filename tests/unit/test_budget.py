@@ -23,25 +23,25 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3349,
+    "exporters": 3350,
     "extraction": 1289,
     "fem": 1440,
     "files": 1313,
     "forecasts": 1184,
     "instruments": 1159,
     "integration": 801,
-    "inverse": 9481,
+    "inverse": 9489,
     "jobs": 245,
     "kernels": 1691,
-    "language": 1595,
+    "language": 1602,
     "law_search": 765,
     "laws": 136,
     "modules": 749,
     "quality": 1230,
-    "readers": 7271,
-    "records": 2470,
+    "readers": 7422,
+    "records": 2473,
     "registry": 615,
-    "reports": 6710,
+    "reports": 6693,
     "rupture_assessment": 1825,
     "sampling": 956,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 31_881
+TESTS = 32_060
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

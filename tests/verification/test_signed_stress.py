@@ -176,6 +176,24 @@ def test_planted_values_are_found_in_reversed_tests_within_their_intervals():
     assert "12 levels of load, -140 to 154 MPa" in DataSummary.of(tests).lines[0]
 
 
+def test_pressed_bars_have_the_law_of_the_same_bars_pulled():
+    rng, times = np.random.default_rng(4), np.linspace(200.0, 14400.0, 40)
+    readings = {s: 1e-14 * s**4 * times + 1e-5 * rng.normal(size=times.size) for s in (80.0, 110.0, 140.0)}
+
+    def fitted(sign):
+        tests = [
+            ck.History(f"{s:g}", times, {"strain": sign * e}, ck.StressSteps(((0.0, sign * s),), control="stress"), 1e3)
+            for s, e in readings.items()
+        ]
+        return ck.identify("norton", tests)
+
+    pulled, pressed = fitted(1.0), fitted(-1.0)
+    assert pressed.values == pytest.approx(pulled.values, rel=1e-4)
+    assert pressed.rms == pytest.approx(pulled.rms, rel=1e-3)
+    assert pressed.values["n"] == pytest.approx(4.0, abs=0.03)
+    assert pressed.adequacy.explains
+
+
 def test_files_keep_the_signs_of_stress_and_strain(tmp_path):
     steps = ck.StressSteps(((0.0, 100.0), (1000.0, -100.0), (2000.0, -20.0)), control="stress")
     strain = run("norton", NORTON, steps, TIMES).outputs["strain"] - 1e-5

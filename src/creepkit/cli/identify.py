@@ -148,7 +148,7 @@ def _search(
 ) -> None:
     """Search laws, and write the ranking and the front."""
     from creepkit.law_search.law_file import write_law_file
-    from creepkit.reports.law_search import law_search_text
+    from creepkit.reports.ranking import law_search_text
 
     _tell_assumptions(histories)
     if to.suffix != ".py":

@@ -75,7 +75,7 @@ def command(
         print_json({"tests": found, "quality": quality, **errors})
     else:
         without = len(found) - len(framed)
-        counted = f"{without} test{'' if without == 1 else 's'} without frames" if without else ""
+        counted = f"{without} test{'' if without == 1 else 's'} without a curve to check" if without else ""
         flags = str(quality) if framed or remarked else ""
         tell("\n".join(filter(None, (report.histories_text(found), counted, flags))))
     if to is not None:

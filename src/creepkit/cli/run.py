@@ -66,7 +66,7 @@ def command(
 def print_result(result: StudyResult) -> None:
     """How each stage ended, what was found, and where the report is."""
     from creepkit.reports.answer import answer_text, asked_figures, rupture_figures, table_of_groups
-    from creepkit.reports.blocks import as_text, plural
+    from creepkit.reports.blocks import Paragraph, as_text, plural
 
     tell(result.title)
     told = [(one.name, one.state, one.sentence) for one in result.stages if one.state != "made" or one.sentence]
@@ -78,8 +78,8 @@ def print_result(result: StudyResult) -> None:
     of = {name: f"{group}: " if len(result.rankings) > 1 else "" for name, group in result.forecast_groups.items()}
     lines = [f"{of[name]}{one.line}" for name, found in result.forecasts.items() for one in asked_figures(found)]
     lines += [one.line for assessment in result.rupture.values() for one in rupture_figures(assessment)]
-    for line in lines[:MOST_FIGURES]:
-        tell(line)
+    if lines:
+        tell(as_text([*map(Paragraph, lines[:MOST_FIGURES])]))
     rankings = result.rankings
     name = "ranking.json" if len(rankings) == 1 else f"{next(iter(rankings), '')}_ranking.json"
     path = None if result.folder is None else result.folder / name
@@ -91,12 +91,12 @@ def print_result(result: StudyResult) -> None:
     if result.report is not None:
         tell(f"report: {result.report}")
     if rankings and path is not None:
-        tell(f"laws: {path}; forecast: creepkit predict {path} {_test_as_options(next(iter(rankings.values())).best)}")
+        tell(f"laws: {path}\nforecast: creepkit predict {path} {_test_as_options(next(iter(rankings.values())).best)}")
 
 
 def _test_as_options(fit: Identification) -> str:
     """A test like those that a law was identified from, as options of `creepkit predict`; TESTS where not of bars."""
-    from creepkit.reports.next_steps import are_bars
+    from creepkit.reports.advice import are_bars
 
     if not are_bars(fit):
         return "TESTS"

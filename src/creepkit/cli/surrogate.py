@@ -50,7 +50,7 @@ def generate(
     Interrupted, it goes on where it was when it is started again in the same way.
     """
     from creepkit.dataset.generation import resolve_design
-    from creepkit.reports.dataset import print_dataset
+    from creepkit.reports.surrogate import print_dataset
 
     chosen = ParallelExecution(**execution)
     changes: dict[str, Any] = {"domain": domain, **(conditions or {})}

@@ -206,9 +206,9 @@ class CompositionMap(Presentable, Plotted, Tabulated):
     def __repr__(self) -> str:
         return f"<CompositionMap of {len(self.alloys)} alloys of {', '.join(self.elements)}>"
 
-    drawn_by = "composition.composition_figure", "composition.draw_map"
+    drawn_by = "screening.composition_figure", "screening.draw_map"
 
-    shown_by = "composition.composition_text"
+    shown_by = "screening.composition_text"
 
 
 def _intervals(regression: CompositionRegression, contents: Floats) -> Floats:

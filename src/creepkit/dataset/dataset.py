@@ -144,7 +144,7 @@ class Dataset(Presentable):
         end = conditions["end_time"] if "end_time" in conditions else self.grid.end  # noqa: SIM401
         return self.grid.times(end)
 
-    shown_by = "dataset.dataset_text"
+    shown_by = "surrogate.dataset_text"
 
 
 def concatenate(parts: Sequence[Dataset]) -> Dataset:

@@ -82,7 +82,7 @@ class Design(Presentable, Plotted):
 
     drawn_by = "design.design_figure", "design.draw_design"
 
-    shown_by, detailed_by = "design.design_answer", "design.design_details"
+    shown_by, detailed_by = "design.design_answer", "design.design_blocks"
 
 
 def precision_text(value: float, unit: str | None = None) -> str:

@@ -231,6 +231,7 @@ class MathmlPrinter(ReadableSums, MathMLPresentationPrinter):  # type: ignore[mi
         except ValueError:  # of a maximum, which sympy cannot compare with the exponential of a number
             kept = expr
         text = re.sub(r"&(\w+);", _character_reference, str(super().doprint(kept)))
+        text = text.replace("<mo>-</mo>", "<mo>&#x2212;</mo>")  # a minus, where a hyphen is as short as one
         return text.replace("<mo>&#x2062;</mo>", '<mo rspace="0.17em">&#x2062;</mo>')  # b exp, and not bexp
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:

@@ -70,7 +70,7 @@ class Forecast(Presentable, Plotted, Tabulated):
 
     drawn_by = "forecast.forecast_figure", "forecast.draw_forecast"
 
-    shown_by, detailed_by = "forecast.forecast_answer", "forecast.forecast_details"
+    shown_by, detailed_by = "forecast.forecast_answer", "forecast.forecast_blocks"
 
 
 @checked

@@ -72,7 +72,7 @@ class Imposed(Presentable):
         errors = response * (self.load.at(times[:, None] + shifts) - loads[:, None]) + rate[:, None] * shifts
         return np.asarray(np.sqrt(errors**2 @ probability))
 
-    shown_by = "instrument_records.imposed_text"
+    shown_by = "extraction.imposed_text"
 
 
 @checked

@@ -93,7 +93,7 @@ class CrossValidation(Presentable):
         ]
         return relative_squared_error([one[0] for one in readings], [one[1] for one in readings])
 
-    shown_by = "inference.cross_validation_text"
+    shown_by = "identification.cross_validation_text"
 
 
 @checked

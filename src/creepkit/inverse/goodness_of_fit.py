@@ -17,7 +17,7 @@ from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import noise_standard_deviation, usable_frames
 from creepkit.inverse.single_values import SingleValue
-from creepkit.records import History, Prediction, is_logarithmic
+from creepkit.records import History, Prediction
 
 
 @checked
@@ -210,13 +210,13 @@ def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floa
     For tests followed to rupture, the orthogonal residual instead.
     """
     observations = problem.observations
-    named = zip(observations.outputs, observations.transforms, strict=True)
-    floor = observations.per_observation([one.floor if is_logarithmic(name) else np.inf for name, one in named])
+    floor = observations.strain_floor
     vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
     predicted = observations.inverse(vertical + problem.observations.transformed_values) + offset
-    above_floor = observations.present & (observations.values > 2 * floor)
-    measured = np.where(above_floor, observations.values, 1.0)
-    predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)
+    size = observations.direction * observations.values
+    above_floor = observations.present & (size > 2 * floor)
+    measured = np.where(above_floor, size, 1.0)
+    predicted_strain = np.where(above_floor, np.maximum(observations.direction * predicted, floor), 1.0)
     log_ratio = np.where(
         observations.followed_to_rupture[:, None],
         residuals.values + residuals.offset_sensitivity * offset,

@@ -118,7 +118,7 @@ def check_creep(observations: ObservationVector, histories: Sequence[History]) -
     for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
         mask = observations.leading_output & (observations.output_index == position)
         if is_logarithmic(name):
-            if (mask & (observations.values > 2 * transform.floor)).any():
+            if (mask & (np.abs(observations.values) > 2 * transform.floor)).any():
                 return
             continue
         for k, history in enumerate(histories):

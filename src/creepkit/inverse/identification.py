@@ -155,7 +155,7 @@ class Identification(RateStatements, Presentable, Plotted, Tabulated):
     @property
     def remarks(self) -> tuple[str, ...]:
         """What limits the trust in it, a sentence each: its notes, and what its numbers say."""
-        from creepkit.reports.remarks import remarks
+        from creepkit.reports.verdicts import remarks
 
         return remarks(self)
 

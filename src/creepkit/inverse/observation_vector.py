@@ -280,6 +280,17 @@ class ObservationVector:
         return SharedNoise.of_correlations(self.noise_correlation, self.output_index, self.frame_index)
 
     @cached_property
+    def strain_floor(self) -> Floats:
+        """(tests, observations) the floor of the transform of strains, infinite of other outputs."""
+        named = zip(self.outputs, self.transforms, strict=True)
+        return self.per_observation([one.floor if is_logarithmic(name) else np.inf for name, one in named])
+
+    @cached_property
+    def direction(self) -> Floats:
+        """(tests, observations) -, -1 where a bar is shorter than at its start by more than the floor, else 1."""
+        return np.where(self.values < -self.strain_floor, -1.0, 1.0)
+
+    @cached_property
     def log_times(self) -> Floats:
         """(tests, observations) ln of time in s."""
         return np.log(self.times)

@@ -195,7 +195,7 @@ def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | 
             strain, time = reference_end_strain(history, predictor), _duration(history)
         elif is_logarithmic(output):
             last = int(np.flatnonzero(usable_frames(history, output))[-1])
-            strain, time = float(history.outputs[output][last]), float(history.times[last])
+            strain, time = abs(float(history.outputs[output][last])), float(history.times[last])
         else:
             increase, time = _output_increase(history)
             strain = increase / growth_per_strain(history, predictor)

@@ -69,7 +69,8 @@ def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_sl
 def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
     """Residuals of zero with the derivatives at the measured values: a covariance exists before any prediction."""
     derivatives = np.where(observations.present, observations.derivative(observations.values), 0.0)
-    zero, rates = np.zeros_like(derivatives), derivatives * np.maximum(observations.values, 0.0)
+    strains = observations.direction * np.maximum(observations.direction * observations.values, 0.0)
+    zero, rates = np.zeros_like(derivatives), derivatives * strains
     return _masked_residuals(observations, zero, derivatives, np.zeros((*zero.shape, 0)), rates)
 
 
@@ -159,7 +160,7 @@ def median_log_rate_excess(observations: ObservationVector, residuals: Floats) -
     with a linear one it is taken of the increase since the first frame, and grows after a rupture.
     """
     predicted = residuals + observations.transformed_values
-    log_ratios = np.where(observations.leading_output, residuals, np.nan)
+    log_ratios = np.where(observations.leading_output, residuals * observations.direction, np.nan)
     for position, transform in enumerate(observations.transforms):
         mask = observations.leading_output & (observations.output_index == position) & observations.present
         if not isinstance(transform, LinearTransform) or not mask.any():

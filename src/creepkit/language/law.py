@@ -10,7 +10,7 @@ from creepkit.checked_arguments import checked
 from creepkit.language import algebra
 from creepkit.language.algebra import times
 from creepkit.language.law_record import LawRecord
-from creepkit.language.printing import LatexLawPrinter, latex_equations, law_text
+from creepkit.language.printing import LatexLawPrinter, latex_equations, law_expression, law_text
 
 
 @checked
@@ -96,8 +96,6 @@ class CreepLaw(LawRecord):
 
         Values enter by name, law.expr.subs(fit.values).
         """
-        from creepkit.reports.law_names import law_expression
-
         return law_expression(self)
 
     def latex(self) -> str:

@@ -10,7 +10,7 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
 from creepkit.language.law_record import LawRecord
-from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
+from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, parameters, temperature
 
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
 
@@ -155,3 +155,14 @@ def law_text(law: LawRecord) -> str:
     for reference in law.references:
         lines.append(f"  see {reference}")
     return "\n".join(lines)
+
+
+def law_expression(law: LawRecord) -> sympy.Expr:
+    """The rate of a law with the symbols R and T_ref in its Arrhenius factors."""
+    (R, T_ref), rate = parameters("R T_ref"), law.rate
+    for exponential in rate.atoms(sympy.exp):
+        for part in sympy.Add.make_args(exponential.args[0]):
+            if found := arrhenius_exponent(part):
+                reference = 1 / T_ref if math.isfinite(found.T_ref) else 0
+                rate = rate.subs(part, -found.Q / R * (1 / temperature - reference))
+    return rate

@@ -62,12 +62,12 @@ class LawSearch(Presentable, Plotted, Tabulated):
         """The laws tried of which none simpler has a smaller misfit, simplest first."""
         return front_of(self.tried)
 
-    drawn_by = "law_search.front_figure", "law_search.draw_front"
+    drawn_by = "ranking.front_figure", "ranking.draw_front"
 
     def __repr__(self) -> str:
         return f"<LawSearch: {len(self.tried)} sentences, best {self.best.law.name}>"
 
-    shown_by = "law_search.law_search_text"
+    shown_by = "ranking.law_search_text"
 
 
 def front_of(laws: Sequence[SearchedLaw]) -> tuple[SearchedLaw, ...]:

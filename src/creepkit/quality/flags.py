@@ -84,7 +84,7 @@ class DataQuality(Presentable):
     def __len__(self) -> int:
         return len(self.flags)
 
-    shown_by = "histories.data_quality_text"
+    shown_by = "histories.quality_blocks"
 
 
 def frame_ranges_text(frames: Sequence[int]) -> str:

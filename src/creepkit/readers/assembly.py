@@ -1,9 +1,4 @@
-"""One test as text becomes one History; every file layout ends here.
-
-A piece that is pressed gains area, where a bar under tension loses it. A file tells this by a word, or by negative
-stresses and strains. With e = 1 - h / h_0 of the height the logarithmic strain is -ln(1 - e), and the true stress the
-nominal one times 1 - e, which is what a law of a bar is given. The height is its gauge length, unless one is stated.
-"""
+"""One test as text becomes one History; every file layout ends here."""
 
 from __future__ import annotations
 
@@ -19,6 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError, SolveError, quoted
+from creepkit.readers.compression import as_compressed, as_shortening, is_compression, take_height
 from creepkit.readers.conditions import (
     END_OF_TEST_TERMS,
     StatedConditions,
@@ -57,18 +53,7 @@ from creepkit.readers.standard_names import in_standard_keys, in_standard_names,
 from creepkit.readers.table import CellTable, SourceText
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, split_written_name, words_of
 from creepkit.readers.weak_sources import with_weak_sources
-from creepkit.records import (
-    SECONDS_PER_HOUR,
-    UNKNOWN_DURATION,
-    History,
-    Loading,
-    Program,
-    RecordedLoading,
-    dimensions_of,
-    known_specimens,
-    specimen_of,
-)
-from creepkit.records.loading import held_of
+from creepkit.records import SECONDS_PER_HOUR, UNKNOWN_DURATION, History, dimensions_of, known_specimens, specimen_of
 from creepkit.records.specimen_lookup import lengths_by_default
 from creepkit.specimens.elastic_part import with_elastic_part
 
@@ -101,7 +86,8 @@ def assemble_history(
     conditions = StatedConditions(entries, vocabulary, location, columns_as_labels=columns_as_labels)
     for assumption in table.assumptions:
         conditions.record_assumption(assumption)
-    _take_height(conditions, name)
+    take_height(conditions, name)
+    conditions.ask_of_notch()
     frames = with_changes_of_lengths(conditions, read_frames(table, vocabulary, conditions.terms, skipped_columns))
     frames = without_unloaded_readings(conditions, as_plain_bar(conditions, frames))
     frames = up_to_rupture(conditions, from_loading_on(conditions, frames), name)
@@ -133,9 +119,9 @@ def assemble_history(
             "a rupture time or a minimum rate is that of tension: write the size of the stress"
         )
     if signed and "strain" in outputs and not (loading.program().values > 0.0).any():
-        outputs["strain"] = _as_shortening(conditions, outputs["strain"])
-    if "strain" in outputs and loading.quantity == "stress" and not signed and _is_compression(conditions, name):
-        loading, outputs["strain"] = _as_compressed(loading, frames.times, outputs["strain"], strain_measure)
+        outputs["strain"] = as_shortening(conditions, outputs["strain"])
+    if "strain" in outputs and loading.quantity == "stress" and not signed and is_compression(conditions, name):
+        loading, outputs["strain"] = as_compressed(loading, frames.times, outputs["strain"], strain_measure)
         strain_measure = "logarithmic"
         conditions.record_assumption("compression (its area grows and stresses are true ones)", first=True)
     if "strain" in outputs:
@@ -214,6 +200,7 @@ def assemble_without_frames(
     """
     known = vocabulary.terms(specimen_named(entries, vocabulary))
     conditions = StatedConditions(in_standard_keys(entries, known), vocabulary, location)
+    conditions.ask_of_notch()
     rate_known = conditions.states("minimum_rate")
     time, ended, is_end = _time_and_end(conditions, Path(source.partition(" (")[0]), name)
     end = conditions.take_number("end_time")
@@ -229,8 +216,9 @@ def assemble_without_frames(
         ended = ""
     _check_end_without_frames(time, end, ended, location)
     if not rate_known and end is not None and not ended:
-        what = f"'{end.key}' says how long the test lasted, and nothing whether it broke then; which is it?"
-        raise conditions.question(what, "ended", RUPTURED, STOPPED, location=end.location, is_free=False)
+        raise conditions.question(
+            f"'{end.key}' {UNSAID_END}", "ended", RUPTURED, STOPPED, location=end.location, is_free=False
+        )
     if not rate_known and time is None and ended != "stopped":
         raise conditions.missing_error(
             "frames, no minimum creep rate and no end of the test",
@@ -275,6 +263,7 @@ def _check_end_without_frames(time: StatedNumber | None, end: StatedNumber | Non
         raise HistoryError(f"{location}: the test was stopped, and nothing says when; write end_time_h")
 
 
+UNSAID_END = "says how long the test lasted, and nothing whether it broke then; which is it?"
 _OF_OTHER_THINGS = ("assumed", "ended", "heat", "laboratory", "operator")
 """Labels that do not say how a test ended; `ended` is what creepkit's simulation says beside a time of rupture."""
 
@@ -298,6 +287,14 @@ def _time_and_end(
             continue
         at = frames.line_of(label) if frames is not None else None
         if at == "earlier":
+            is_plain = len(text.split()) < 3  # "rupture of a fuse" says nothing
+            if is_plain and end_said_by(text) == RUPTURED and text.casefold() not in conditions.end_terms:
+                what = (
+                    f"'{quoted(text, 60)}' in {label} says that the test broke, and readings follow; correct them, or"
+                )
+                raise conditions.question(
+                    f"{what} does it say nothing of the test?", "ended", {text: LABEL}, is_free=False
+                )
             if conditions.end_terms.get(text.casefold(), LABEL) != LABEL:
                 what = f"remark '{quoted(text, 60)}' of {label} is not of the last frame and says no end"
                 conditions.record_assumption(what.replace(",", ";"))
@@ -307,6 +304,7 @@ def _time_and_end(
             end, asked = {INTERRUPTED: STOPPED, LABEL: ""}.get(end, end), label if asks and end == UNCLEAR else asked
         else:
             (end,) = ends_in_column(label, [text], conditions.end_terms, [False]).ends
+            end = RUPTURED if label.startswith("line ") and _tells_rupture(text) else end
         firmness = firm if kind in FIRM or at == "last" else remarks
         (unclear if end == UNCLEAR else firmness)[label] = text if end == UNCLEAR else end
     said = {end for end in firm.values() if end} or {STOPPED}.intersection(remarks.values())
@@ -335,6 +333,17 @@ def _time_and_end(
 
 _HOURS = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:h|hrs?|hours?|std|stunden|heures?|ore|horas)(?!\w)", re.IGNORECASE)
 """A time in a remark such as `ruptured after 453.1 h, A = 22 %`."""
+
+
+def _tells_rupture(text: str) -> bool:
+    """Whether a line of its own says that the test broke, and no more than that or when."""
+    first = re.split(r"[,;] ", text)[0]
+    is_short = _HOURS.search(first) or len(text.split()) <= MOST_WORDS
+    return bool(is_short) and kind_of_column(_HOURS.sub("", first)) == RUPTURED
+
+
+MOST_WORDS = 3
+"""Of a line without a time: longer ones are about something else."""
 
 
 AT_LAST_FRAME = 0.01
@@ -528,51 +537,3 @@ def _end_of_test(
         return None if time is None else time.value, ended == "stopped"
     conditions.record_assumption("rupture at the last frame")
     return float(frames.times[used][-1] if used.any() else frames.times[-1]), False
-
-
-# ---- compression -----------------------------------------------------------------------------------------------------
-
-
-_COMPRESSION = re.compile(r"\bcompres(?:s(?:ion|ive|ed|ione)|i[oó]n)\b|druckkriech|stauchversuch", re.IGNORECASE)
-"""Of a test that presses, in English, French and German; a compressor disc is none."""
-
-
-_TENSION = re.compile(r"tensi|traction|trazione|tracci|zug", re.IGNORECASE)
-"""Beside them of a machine for both."""
-
-
-def _is_compression(conditions: StatedConditions, name: str) -> bool:
-    """Whether a test says of itself, in its name, titles, labels or signs, that it is one of compression."""
-    said = (name, conditions.text_of("name"), *conditions.labels, *conditions.labels.values(), *conditions.assumed)
-    return any(_COMPRESSION.search(text) and not _TENSION.search(text) for text in said)
-
-
-def _take_height(conditions: StatedConditions, name: str) -> None:
-    """Make the height of a piece that is compressed its gauge length, where none is stated."""
-    if {"height", "gauge_length"} & conditions.geometry.keys() == {"height"} and _is_compression(conditions, name):
-        height = conditions.geometry["gauge_length"] = conditions.geometry.pop("height")
-        conditions.record_assumption(f"the height {height:g} mm is the gauge length")
-
-
-def _as_shortening(conditions: StatedConditions, strain: Floats) -> Floats:
-    """Strain (frames,) - under a stress that is stated as negative, below zero as well."""
-    if strain[np.isfinite(strain)].sum() <= 0.0:
-        return strain
-    conditions.record_assumption("shortening is a negative strain, as its stress is negative", first=True)
-    return -strain
-
-
-def _as_compressed(loading: Loading, times: Floats, strain: Floats, measure: str) -> tuple[Loading, Floats]:
-    """The loading with the true stress, and the logarithmic shortening (frames,) -, of a piece that is compressed.
-
-    times, strain : (frames,) s and -, of which shortening may be negative; measure : "engineering" or "logarithmic".
-    """
-    known = np.isfinite(strain)
-    shortening = -strain if strain[known].sum() < 0.0 else strain
-    if measure == "engineering":
-        shortening = -np.log1p(-np.minimum(shortening, 0.99))
-    if held_of(loading) == "stress" or not known.any():
-        return loading, shortening
-    at = np.concatenate([[0.0], times[known & (times > 0.0)]])
-    grown = np.interp(at, times[known], shortening[known])
-    return RecordedLoading(Program(at, loading.program().at(at) * np.exp(-grown)), "stress", "stress"), shortening

@@ -145,7 +145,12 @@ positive one behind a stroke belongs to the time there: %/10^3 h."""
 _PER_CENT = (
     r"(\d+(?:[.,]\d+)?)\s*(?:%|pct\b|per ?cent\b|percent\b|prozent\b|procent\b|pour ?cent\b|per ?cento\b|por ?ciento\b)"
 )
-_SYMBOL_TO_STRAIN = re.compile(rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?", re.IGNORECASE)
+_SYMBOL_TO_STRAIN = re.compile(
+    rf"t[\s_]*\(?\s*(?:[eε]p?\s*=?\s*)?{_PER_CENT}\s*\)?(?:[\s_,/(\[].*)?"
+    r"|t[\s_]?[pf][\s_]?(\d+(?:[.,]\d+)?)(?:\s*%)?(?:[\s_,/]+\w+|\s*[(\[]\w+[)\]])?",
+    re.IGNORECASE,
+)
+"""Also t_p and t_f of ISO 204, to a plastic and to a creep elongation in per cent."""
 _UNIT_IN_NAME = {
     "h": r"hours?|hrs?|stunden|heures?|ore|horas|uur|uren",
     "d": r"days|tage|jours|giorni|dias|dagen",
@@ -228,7 +233,7 @@ def _strain_reached(written: str) -> float | None:
         return None
     if _OF_NO_TEST.search(plain_words(split_written_name(text)[0])):
         return None
-    number = float(found[1].replace(",", "."))
+    number = float(next(filter(None, found.groups())).replace(",", "."))
     return number / 100 if 0 < number <= 100 else None
 
 
@@ -445,5 +450,5 @@ def stands_in_columns(table: CellTable, meant: Mapping[str, str]) -> bool:
     rows = table.rows[:_MOST_IN_COLUMNS]
     names = [row.cells[0] for row in rows if row.cells[0]]
     known = [bool(column_called(meant.get(name, name)).quantity) for name in names]
-    filled = [sum(map(bool, row.cells)) for row in rows]
-    return 2 * sum(known) > len(known) and min(filled) > 2 and is_test_table(names)
+    filled = sum(sum(map(bool, row.cells)) > 2 for row in rows)
+    return 2 * sum(known) > len(known) and 2 * filled > len(rows) and is_test_table(names)

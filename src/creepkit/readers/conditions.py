@@ -93,6 +93,11 @@ class StatedNumber:
     unit: str = ""
 
 
+def is_control(text: str) -> bool:
+    """Whether a text says what was held, such as `constant load`."""
+    return any(pattern.search(text.casefold()) for pattern in _HELD.values())
+
+
 class StatedConditions:
     """The entries of one test: numbers, texts, geometry and labels; numbers and texts are taken, one by one.
 
@@ -212,6 +217,16 @@ class StatedConditions:
         """Raise the question whether what a name with these words states is a label, unless an answer says so."""
         if name := next((one for one in self.labels if words.search(one) and one not in self._vocabulary.labels), ""):
             raise self.question(f"'{quoted(name, 60)}' {sentence}, it is a label", "columns", {name: LABEL})
+
+    def ask_of_notch(self) -> None:
+        """Raise the question which specimen it is where a label is that of a notched bar, `Kt: 3.6`."""
+        for label, text in {} if self.states("specimen") else self.labels.items():
+            is_factor = re.fullmatch(r"k_?t", label.casefold()) and is_number(text, Dialect()) and float(text) > 1.1
+            is_said = len(text.split()) < 3 and _NOTCHED.search(text.casefold()) and not _SMOOTH.search(text.casefold())
+            if (is_factor or is_said) and label not in self._vocabulary.labels:
+                what = f"'{quoted(label, 60)}' is '{quoted(text, 40)}', and the stress of a notched bar is no plain one"
+                what = f"{what}; leave the test out by its exclude, or which specimen is it?"
+                raise self.question(what, "specimen", "notched-bar", History.specimen)
 
     def all_labels(self) -> dict[str, str]:
         """The labels, with what was assumed; refuses numbers and texts that nothing has used."""

@@ -306,6 +306,7 @@ def kind_of_column(name: str) -> str:
     """What the name of a column says: RUPTURED or STOPPED of tests with a yes, "status", "remark", or ""."""
     plain = plain_words(re.sub(r"\(.*?\)|\[.*?\]|\?", " ", name))
     words = set(plain.replace("|", " ").split()) - {"y", "n", "j", "ja", "nein", "yes", "no", "oui", "non"}
+    words = {one for one in words if len(one) > 2} or words if name.count("/") > 1 else words  # "Status B / UB / I"
     if any(map(_REMARK_WORDS.fullmatch, words)):
         return "remark"
     said = end_said_by(plain)
@@ -356,10 +357,10 @@ def _meanings(kind: str, plain: Set[str]) -> dict[str, str]:
         return {**_meanings_of_flags(kind, {"t", "n"}), "f": STOPPED if kind == RUPTURED else RUPTURED}
     if kind != "remark" and plain and plain <= YES | NO:
         return _meanings_of_flags(kind, plain)
-    if kind in FIRM and (codes := _CODES.get(frozenset(plain))):
-        found: dict[str, str] = dict(codes)
-    else:
-        found = {text: _meaning_of_text(kind, text) for text in plain}
+    found = {text: _meaning_of_text(kind, text) for text in plain}
+    if kind in FIRM:
+        pairs = [codes for texts, codes in _CODES.items() if texts == plain or (len(texts) > 1 and texts < plain)]
+        found |= pairs[0] if len(pairs) == 1 else {}
     if kind == "description" and plain:
         return {text: UNCLEAR if _is_nothing(text) else end for text, end in found.items()} | {"": UNCLEAR}
     if kind == "" and len(plain) == 2 and frozenset(plain) in _CODES:

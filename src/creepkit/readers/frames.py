@@ -216,7 +216,9 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
         if kind_of_column(written) in (*FIRM, "remark"):
             what = f"column '{written}' holds words beside frames; is it a label of the test?"
             raise column_question(table, what, {written: LABEL}, {written: UNUSED})
-        near = [] if _OF_OTHERS.search(written) else get_close_matches(written, kinds, 1, cutoff=0.55)
+        is_of_words = not all(is_number(cell, table.dialect) for cell in cells_of(table.rows, k))
+        is_other = is_of_words or _OF_OTHERS.search(written)
+        near = [] if is_other else get_close_matches(written, kinds, 1, cutoff=0.55)
         asked = f"did you mean '{near[0]}'?" if near else "what does it hold?"
         meant = f"column '{written}' is not understood; {asked}"
         likely = [name for name, one in OF_UNIT.items() if unit_suffix(unit) in one.units and name not in near]
@@ -226,7 +228,7 @@ def _parsed_column(table: CellTable, k: int, name: str, kinds: Mapping[str, Quan
             meant, near, likely = f"{meant} sqrt(3); add them as columns such as stress_MPa and strain_pct", [], []
         elif _OF_OTHERS.search(written):
             near, likely = (["pressure"] if "pressure" in kinds and _PRESSURE.search(written) else []), []
-        named = [] if all(is_number(cell, table.dialect) for cell in cells_of(table.rows, k)) else [{written: "test"}]
+        named = [{written: "test"}] * is_of_words
         options = [{written: f"{one} ({unit})"} for one in (*near, *likely)]
         raise column_question(table, meant, *options, *named, {written: UNUSED})
     quantity, suffix = result

@@ -14,9 +14,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from creepkit.readers.columns_of_tests import (
-    QUANTITIES,
     SEARCHED,
-    TestColumn,
+    TEXTS,
     column_called,
     head_of_tests,
     is_measured,
@@ -59,15 +58,12 @@ def _holds_numbers(row: TableRow, table: CellTable) -> bool:
 def _side_by_side(table: CellTable, meant: Mapping[str, str]) -> list[CellTable]:
     """The tables of tests beside one another in a table; else the table alone."""
     width = max(len(row.cells) for row in table.rows)
-    for is_moved in (True, False):
-        starts = _starts_of_tables(table, meant, width, is_moved=is_moved)
-        whole = [start for start, end in pairwise([*starts, width]) if _head_line(table, range(start, end), meant)]
-        parts = [range(*ends) for ends in pairwise([0, *whole[1:], width])]
-        lines = [_head_line(table, part, meant) for part in parts] if len(parts) > 1 else [0]
-        if all(lines):
-            shared = _rows_of_all(table, lines)
-            return [_part(table, part, shared) for part in parts]
-    return [table]
+    starts = _starts_of_tables(table, meant, width)
+    ends = pairwise([*starts, width]) if len(starts) > 1 else ()
+    whole = [start for start, end in ends if _head_line(table, range(start, end), meant)]
+    parts = [range(*ends) for ends in pairwise([0, *whole[1:], width])]
+    lines = [_head_line(table, part, meant) for part in parts] if len(parts) > 1 else [0]
+    return [_part(table, part, _rows_of_all(table, lines)) for part in parts] if all(lines) else [table]
 
 
 def _head_line(table: CellTable, part: range, meant: Mapping[str, str]) -> int:
@@ -97,10 +93,11 @@ def _rows_of_all(table: CellTable, lines: Sequence[int]) -> list[TableRow]:
     return above + [row for row in alone if row.line > last]
 
 
-def _starts_of_tables(table: CellTable, meant: Mapping[str, str], width: int, *, is_moved: bool) -> list[int]:
+def _starts_of_tables(table: CellTable, meant: Mapping[str, str], width: int) -> list[int]:
     """Columns with which tables side by side may begin: behind a blank one, or where a quantity comes again.
 
-    is_moved : whether a stress or temperature between a result and what comes again begins the next table.
+    Names, stresses or temperatures between a result and what comes again begin the next table, if the one before has
+    others.
     """
     quantities = [_quantity_of_column(table, k, meant) for k in range(width)]
     blank, starts = [_is_blank(table.rows, k) for k in range(width)], [0]
@@ -109,17 +106,13 @@ def _starts_of_tables(table: CellTable, meant: Mapping[str, str], width: int, *,
         if blank[k - 1] and not blank[k]:
             starts.append(k)
         elif quantities[k] and quantities[k] in seen:
-            while is_moved and quantities[start - 1] in _CONDITIONS and any(map(_is_result, seen[: start - k - 1])):
+            while quantities[start - 1] in ("name", *_CONDITIONS) and {*seen[: start - k - 1]} & _CONDITIONS:
                 start -= 1
             starts.append(start)
     return starts
 
 
-_CONDITIONS = ("stress", "temperature")
-
-
-def _is_result(quantity: str) -> bool:
-    return (quantity in QUANTITIES or TestColumn(quantity).strain is not None) and quantity not in _CONDITIONS
+_CONDITIONS = frozenset(("stress", "temperature"))
 
 
 def _is_blank(rows: Sequence[TableRow], k: int) -> bool:
@@ -128,11 +121,11 @@ def _is_blank(rows: Sequence[TableRow], k: int) -> bool:
 
 
 def _quantity_of_column(table: CellTable, k: int, meant: Mapping[str, str]) -> str:
-    """The quantity that the text nearest above the first number of a column names; of a column of texts the first."""
+    """The quantity that the text nearest above the first number of a column names; of a column of texts its name."""
     found = list[str]()
     for row in table.rows[:SEARCHED]:
         cell = row.cells[k] if k < len(row.cells) else ""
         if found and cell and is_measured(cell, table.dialect):
             return found[-1]
         found += [one] if cell and (one := column_called(meant.get(cell, cell)).quantity) else []
-    return found[0] if found else ""
+    return next((one for one in found if one in TEXTS), "".join(found[:1]))

@@ -34,6 +34,7 @@ from creepkit.files.time_stamps import (
     resolve,
     through_midnight,
 )
+from creepkit.readers.conditions import is_control
 from creepkit.readers.names import STATED_BY_NAME
 from creepkit.readers.questions import Question
 from creepkit.readers.table import CellTable, SourceText, TableRow, cells_of
@@ -60,6 +61,7 @@ STRAIN_UNITS: Mapping[str, str] = {"1": "1", "pct": "pct", "microstrain": "micro
 
 
 _VALUE_WITH_UNIT = re.compile(r"([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([^\d\s.,;:+-][^;:]{0,10})", re.ASCII)
+_NOTED = re.compile(r"(.*[^\s(])\s*\(([^()]*[^\W\d_]{3}[^()]*)\)")
 
 
 def in_standard_names(
@@ -70,6 +72,7 @@ def in_standard_names(
     told = {key for key, entry in entries.items() if _tells(known.condition(key), entry.text)}
     entries = {f"label {key}" if key in told else key: entry for key, entry in entries.items()}
     stated = in_standard_keys(entries, known)
+    table = _with_creep_strain_alone(table, known)
     by_titles = [one for key, title in entries.items() for one in _stated_by_title(key, title) if one[0] not in stated]
     table = table.assuming(*(f"{key} {entry.text} by the title in {entry.location}" for key, entry in by_titles))
     for key, entry in [*_stated_by_columns(table), *by_titles]:
@@ -82,6 +85,21 @@ def in_standard_names(
     table = with_elapsed_times(stated, table, known)
     table = _with_decided_temperature(stated, table, known)
     return _with_decided_strains(stated, _without_per_cent_signs(table, known), known)
+
+
+_OF_CREEP = re.compile(r"\b(?:creep|kriech\w*|fluage|kruip\w*)\b|\b[eε](?:ps)? cr?\b")
+
+
+def _with_creep_strain_alone(table: CellTable, known: Terms) -> CellTable:
+    """The table without total, elastic and plastic strains beside the one creep strain."""
+    strains = [k for k, name in enumerate(table.columns) if known.quantity(name) == "strain"]
+    creep = [k for k in strains if _OF_CREEP.search(words_of(split_written_name(table.columns[k])[0]))]
+    others = [k for k in strains if k not in creep]
+    if len(creep) != 1 or not others or {table.columns[k] for k in strains} & known.vocabulary.synonyms.keys():
+        return table
+    listed = " and ".join(f"'{table.columns[k]}'" for k in others)
+    table = table.assuming(f"'{table.columns[creep[0]]}' counts and not {listed}")
+    return table.keeping([k for k in range(len(table.columns)) if k not in others])
 
 
 def _with_decided_temperature(stated: Mapping[str, SourceText], table: CellTable, known: Terms) -> CellTable:
@@ -115,9 +133,13 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
             moduli.append(replace(entry, text=f"{at} = {entry.text} {unit}".strip(), key=entry.key or key))
             continue
         found = split_unit(known.vocabulary.synonyms.get(key, name), known.conditions.kinds)
-        if found and (match := _VALUE_WITH_UNIT.fullmatch(without_uncertainty(entry.text))):
+        value, note = _without_note(without_uncertainty(entry.text)) if found else (entry.text, "")
+        if found and (match := _VALUE_WITH_UNIT.fullmatch(value)):
             suffix = unit_suffix(match[2])
             if suffix in known.conditions.kinds[found[0]].units and found[1] in ("", suffix):
+                if note:
+                    control = found[0] == "stress" and is_control(note)
+                    stated.setdefault("control" if control else f"label {key} (note)", replace(entry, text=note))
                 name, entry = f"{found[0]}_{suffix}", replace(entry, text=match[1])
         if name == "strain_measure":
             said = [STATED_BY_NAME.get(f"{words_of(entry.text)}{rest}", ("", "")) for rest in ("", " strain")]
@@ -130,6 +152,12 @@ def in_standard_keys(entries: Mapping[str, SourceText], known: Terms) -> dict[st
     if moduli:
         stated["modulus_by_temperature"] = replace(moduli[0], text="; ".join(one.text for one in moduli))
     return stated
+
+
+def _without_note(text: str) -> tuple[str, str]:
+    """A value, and what stands in brackets behind its unit, `180 MPa (constant load)`; "" where nothing does."""
+    match = _NOTED.fullmatch(text)
+    return (match[1], match[2]) if match else (text, "")
 
 
 def _stated_by_columns(table: CellTable) -> list[tuple[str, SourceText]]:

@@ -12,10 +12,13 @@
 
 from __future__ import annotations
 
+import math
+import operator
 import re
 import unicodedata
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -261,16 +264,25 @@ _THOUSANDS, _WITH_SIGN = (
 """By a sign, numbers with it, perhaps marked as a time of a run-out is: between thousands, and of any kind."""
 
 
+_WITH_BOTH = re.compile(r"[<>≥(\[]*\s*\d{1,3}(?:(?:\.\d{3})+,|(?:,\d{3})+\.)\d+")
+"""A number that tells which sign stands between thousands, `1.234,5`."""
+
+
 def _without_thousands(table: CellTable, *, is_stated: bool) -> CellTable:
     """The table without the signs between thousands of its numbers, a comma where its decimal sign is a point.
 
-    They are if the decimal sign is stated (is_stated), or if several numbers have a comma, each before three digits; a
-    single one is asked about.
+    They are if the decimal sign is stated (is_stated), if another number has both signs, or if several numbers have a
+    comma, each before three digits; a single one is asked about.
     """
+    both = next((cell for row in table.rows for cell in row.cells if _WITH_BOTH.fullmatch(cell)), "")
+    if both and not table.sheet:  # in which cells of numbers have points
+        table = replace(table, dialect=replace(table.dialect, decimal=max(".,", key=both.rfind)))
     sign = "," if table.dialect.decimal == "." else "."
     signed = [(row, cell) for row in table.rows for cell in row.cells if sign in cell]
     found = [(row, cell) for row, cell in signed if _THOUSANDS[sign].fullmatch(cell)]
     others = [c for _, c in signed if _WITH_SIGN[sign].fullmatch(c) and not _THOUSANDS[sign].fullmatch(c)]
+    others = [c for c in others if not _WITH_BOTH.fullmatch(c)]
+    is_stated |= bool(both)
     if not found or others or (sign == "." and not is_stated):
         return table
     row, cell = found[0]
@@ -308,7 +320,7 @@ def in_plain_numbers(table: CellTable, *, is_stated: bool) -> CellTable:
         if any("10" in cell and _POWER.search(cell) for cell in row.cells):
             rows[k] = TableRow(row.line, [_POWER.sub(_exponent, cell) for cell in row.cells])
     table = _without_footnotes(replace(table, rows=rows))
-    return _without_logarithms(_without_thousands(table, is_stated=is_stated))
+    return _with_plain_columns(_without_thousands(table, is_stated=is_stated))
 
 
 def _hours(found: re.Match[str]) -> str:
@@ -377,27 +389,52 @@ _MAY_BE_LOGARITHM = re.compile(
 _LARGEST_LOGARITHM = 20.0
 
 
-def _without_logarithms(table: CellTable) -> CellTable:
-    """The table with numbers in the place of decimal logarithms, whose columns are called as `log t_r (h)` is."""
-    rows, columns = table.rows, dict[int, str]()
-    at = next((r for r, row in enumerate(rows[:60]) if any(map(_LOGARITHM.fullmatch, row.cells))), len(rows))
+_PART_OF_UNIT = re.compile(r"(?P<name>.+?)\s*[(\[]\s*(?P<part>0[.,]0*1)\s*(?P<unit>[^\W\d]+)\s*[)\]]")
+"""Name of a column in parts of a unit, as a dial gauge has them: `Gauge 1 (0.01 mm)`."""
+
+
+_RECIPROCAL = re.compile(
+    r"(1(?:0{3,4}|e[34])?|10(?:\^|\*\*)[34])\s*/\s*T(?:\s*[,(\[]?\s*(?:1/K|K\^?[-−]1|/K)\s*[)\]]?)?"
+)
+"""Name of a column of an Arrhenius plot, `10^4/T (1/K)`."""
+
+
+def _divided(dividend: float, divisor: float) -> float:
+    return dividend / divisor if divisor else math.inf
+
+
+def _with_plain_columns(table: CellTable) -> CellTable:
+    """The table with numbers in the place of decimal logarithms, reciprocal temperatures and parts of a unit."""
+    rows, names, of = list(table.rows), dict[int, tuple[str, str]](), dict[int, Callable[[float], float]]()
+    patterns = _LOGARITHM, _PART_OF_UNIT, _RECIPROCAL
+    heads = (r for r, row in enumerate(rows[:60]) if any(p.fullmatch(cell) for p in patterns for cell in row.cells))
+    at = next(heads, len(rows))
     for k, cell in enumerate(rows[at].cells if at < len(rows) else ()):
-        if match := _LOGARITHM.fullmatch(cell):
-            name, unit = split_written_name(match["of"])
-            unit = match["unit"] or unit
-            numbers = [abs(float_of(row.cells[k])) for row in rows[at:] if _is_number_at(row, k, table)]
-            is_quantity = unit_suffix(unit) or _MAY_BE_LOGARITHM.fullmatch(plain_name(name).replace("_", " "))
-            if is_quantity and numbers and max(numbers) <= _LARGEST_LOGARITHM:
-                columns[k] = f"{name} ({unit})" if unit else name
-    if not columns:
-        return table
-    notes = [f"'{rows[at].cells[k]}' is a decimal logarithm" for k in columns]
-    changed = [TableRow(rows[at].line, [columns.get(k, cell) for k, cell in enumerate(rows[at].cells)])]
-    for row in rows[at + 1 :]:
-        powers = {k: f"{10.0 ** float_of(row.cells[k]):.12g}" for k in columns if _is_number_at(row, k, table)}
-        powers = {k: text.replace(".", table.dialect.decimal) for k, text in powers.items()}
-        changed.append(TableRow(row.line, [powers.get(k, cell) for k, cell in enumerate(row.cells)]))
-    return replace(table, rows=[*rows[:at], *changed]).assuming(*notes)
+        if match := _PART_OF_UNIT.fullmatch(cell):
+            names[k] = f"{match['name']} ({match['unit']})", f"'{cell}' in whole {match['unit']}"
+            of[k] = partial(operator.mul, float(match["part"].replace(",", ".")))
+        elif match := _RECIPROCAL.fullmatch(cell):
+            names[k] = "T (K)", f"'{cell}' is a reciprocal temperature"
+            of[k] = partial(_divided, float(match[1].replace("10^", "1e").replace("10**", "1e")))
+        elif name := _name_of_logarithm(cell, [row.cells[k] for row in rows[at:] if _is_number_at(row, k, table)]):
+            names[k], of[k] = (name, f"'{cell}' is a decimal logarithm"), partial(pow, 10.0)
+    for r in range(at, len(rows) if of else at):
+        changed = {k: f"{of[k](float_of(rows[r].cells[k])):.12g}" for k in of if _is_number_at(rows[r], k, table)}
+        changed = {k: text.replace(".", table.dialect.decimal) for k, text in changed.items()}
+        changed |= {k: name for k, (name, _) in names.items() if r == at}
+        rows[r] = TableRow(rows[r].line, [changed.get(k, cell) for k, cell in enumerate(rows[r].cells)])
+    return replace(table, rows=rows).assuming(*(note for _, note in names.values()))
+
+
+def _name_of_logarithm(cell: str, numbers: Sequence[str]) -> str:
+    """The name of what a column of decimal logarithms holds; "" of any other column."""
+    match = _LOGARITHM.fullmatch(cell)
+    name, unit = split_written_name(match["of"]) if match else ("", "")
+    unit = (match and match["unit"]) or unit
+    is_quantity = unit_suffix(unit) or _MAY_BE_LOGARITHM.fullmatch(plain_name(name).replace("_", " "))
+    if not (match and is_quantity and numbers and max(map(abs, map(float_of, numbers))) <= _LARGEST_LOGARITHM):
+        return ""
+    return f"{name} ({unit})" if unit else name
 
 
 def _is_number_at(row: TableRow, column: int, table: CellTable) -> bool:
@@ -427,7 +464,8 @@ def without_ignored(table: CellTable, names_at: int, ignored: Collection[str]) -
         return replace(table, header=header)
     kept = [k for k in range(max(len(row.cells) for row in table.rows)) if k not in left_out]
     rows = [row for row in with_columns(table.rows, kept) if any(row.cells)]
-    return replace(table, header=header, rows=rows, positions=kept)
+    places = table.positions or range(kept[-1] + 1 if kept else 0)
+    return replace(table, header=header, rows=rows, positions=[places[k] for k in kept])
 
 
 def _columns_called(name: str, cells: Sequence[str]) -> list[int]:

@@ -23,6 +23,7 @@ from creepkit.readers.vocabulary import (
     HeaderVocabulary,
     Terms,
     in_unit,
+    is_symbol,
     split_unit,
     split_written_name,
     unit_behind,
@@ -31,6 +32,7 @@ from creepkit.readers.vocabulary import (
 )
 from creepkit.readers.weak_sources import conditions_in_text, conditions_of_head
 from creepkit.records import known_specimens
+from creepkit.records.quantities import TEMPERATURE
 
 _MOST_ROWS, _MOST_BELOW = 60, 6
 """Rows among which the names of the columns are looked for, and rows of a head below them."""
@@ -311,7 +313,7 @@ class HeadOfTest:
         key = self.known.condition(written)
         if key in self.entries and key.startswith("label line "):
             text = f"{self.entries[key].text}; {text}"
-        elif key in self.entries:
+        elif key in self.entries and self.entries[key].text != text:
             raise HistoryError(f"{place}: '{quoted(written, 60)}' was already given; keep one of them")
         self.entries[key] = SourceText(text, place, self.table.dialect.decimal, written)
 
@@ -336,6 +338,8 @@ class HeadOfTest:
             cells = [", ".join(cells)]  # a title with commas
         while len(cells) > 1 and cells[0] == cells[1] and not known.is_condition(cells[0].rstrip(": ")):
             cells = cells[1:]  # a title in merged cells
+        while len(cells) > 2 and cells[0].endswith(":") and cells[1].endswith(":"):
+            cells = cells[1:]  # "Data header:", a title of a line of keys
         key, colon, value = (part.strip() for part in "".join(cells[:1]).partition(":"))
         is_program = known.condition(key).endswith(("_steps", "_program"))  # whose pairs a delimiter may have parted
         if colon and known.is_condition(key) and (len(cells) == 1 or is_program):
@@ -343,6 +347,8 @@ class HeadOfTest:
         while cells:
             key, *cells = cells
             plain = key.rstrip(": ")
+            if re.fullmatch(r"\[[^\[\]]*\]|<[^<>]*>", key) and not cells:
+                continue  # of a section
             if is_number(key, self.table.dialect):
                 what = f"the number {quoted(key)} stands above the names of the columns and has no key before it"
                 raise HistoryError(f"{place}: {what}; name every column of the table, or the condition")
@@ -365,9 +371,30 @@ class HeadOfTest:
                 self.add_title(key, row)
 
 
+def named_values(rows: Sequence[TableRow], table: CellTable, known: Terms) -> list[TableRow]:
+    """The rows of a head, those of numbers below names, `Width (mm);L0 (mm)` above `6;40`, as pairs of both."""
+    found = list[TableRow]()
+    for row in rows:
+        above = found[-1].cells if found and row.line - found[-1].line == 1 else ()
+        numbers = [k for k, cell in enumerate(row.cells) if cell and is_number(cell, table.dialect)]
+        named = [k for k, cell in enumerate(row.cells) if cell and above[k : k + 1] and above[k]]
+        is_pair = any(known.is_condition(cell.rstrip(": ")) for cell in row.cells if cell)
+        is_named = all(k in named or k == 0 for k in numbers) and not any(
+            is_number(c, table.dialect) for c in above if c
+        )
+        of_test = [k for k in numbers if k in named and known.is_condition(above[k])]
+        if is_named and not is_pair and (of_test or len({*numbers} & {*named}) > 1):
+            found[-1:] = [TableRow(row.line, [above[k], row.cells[k]]) for k in named]
+        else:
+            found.append(row)
+    return found
+
+
 def _with_unit(key: str, unit: str, place: str) -> str:
     """A key with the unit that stands behind its value; HistoryError where the key has another one."""
-    _, stated = split_written_name(key.rstrip(": "))
+    name, stated = split_written_name(key.rstrip(": "))
+    if is_symbol(key, stated) and unit_suffix(unit) not in TEMPERATURE.units:
+        return f"{name} ({unit})"
     if stated and unit_suffix(stated) != unit_suffix(unit):
         what = f"'{quoted(key, 60)}' has the unit '{quoted(unit, 20)}' behind its value"
         raise HistoryError(f"{place}: {what}; keep one of the two units")

@@ -37,6 +37,7 @@ from creepkit.readers.table_heads import (
     heads_of_tests,
     is_frame,
     is_time,
+    named_values,
     test_and_column,
 )
 from creepkit.readers.vocabulary import HeaderVocabulary, Terms, names_tests, split_written_name, unit_suffix, words_of
@@ -467,7 +468,7 @@ def _tests_of_rows(headed: HeadedTable) -> list[TabulatedTest]:
     if not headed.times:
         raise head_question(replace(headed.table, columns_line=headed.table.rows[0].line), headed.names)
     head = HeadOfTest(headed.table, headed.known)
-    for row in headed.whole:
+    for row in named_values(headed.whole, headed.table, headed.known):
         head.read(row)
     refuse_twice(head.entries, headed.table.header, headed.known)
     table, footers = without_remarks_around(headed.table, head.entries, headed.known)

@@ -323,7 +323,7 @@ class TestTable:
                 units = (unit_behind(cell, kind) for cell in cells)
                 column = replace(column, unit=column.unit or next(filter(None, units), ""))
                 collected(self.errors, partial(self._convert_cells, k, column, written))
-                if kind is TIME and not column.unit and (unit := unit_in(" | ".join(self.notes), TIME, "(?:in|en) ")):
+                if kind is TIME and not column.unit and (unit := unit_in(" | ".join(self.notes), TIME, _BEFORE_UNIT)):
                     self.table = self.table.assuming(f"'{quoted(written, 60)}' in {unit} by the title")
                     column = replace(column, unit=unit)
                 if column.unit not in kind.units:
@@ -569,6 +569,10 @@ class TestTable:
             f"'{quoted(row.cells[k], 40)}' in '{quoted(self.names[k], 40)}'" for k in columns if _is_word(row.cells[k])
         ]
         return " and ".join(found) or ("nothing but ignored columns" if self.vocabulary.ignored else "no result")
+
+
+_BEFORE_UNIT = r"(?:(?:in|en) |(?=\w+ (?:to|until|bis|pour)\b))"
+"""Before the unit of times in a title, `Times in hours` and `Hours to 1 %`."""
 
 
 _LONGEST_TITLE = 40

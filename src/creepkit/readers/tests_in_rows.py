@@ -26,12 +26,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 from creepkit.errors import HistoryError, quoted
 from creepkit.files.delimited_text import float_of, is_missing
-from creepkit.readers.assembly import assemble_history, assemble_without_frames
+from creepkit.readers.assembly import UNSAID_END, assemble_history, assemble_without_frames
 from creepkit.readers.columns_of_tests import (
     RATES,
     SAYS_RUPTURE,
@@ -81,7 +81,18 @@ def tables_of(path: Path, meant: Mapping[str, str]) -> list[CellTable]:
     """The tables in a text file, or in the sheets of a spreadsheet; meant : as of `separate_tables`."""
     is_spreadsheet = path.suffix.lower() in SPREADSHEET_SUFFIXES
     tables = read_sheets(path) if is_spreadsheet else [read_text_table(path)]
-    return [one_row_a_test(one) for table in tables for one in separate_tables(table, meant)]
+    separate = [one for table in tables for one in separate_tables(_turned(table, meant), meant)]
+    return [one_row_a_test(one, meant) for one in separate]
+
+
+def _turned(table: CellTable, meant: Mapping[str, str]) -> CellTable:
+    """A table of tests in columns with its columns as rows, which places tell; any other table as it is."""
+    if not stands_in_columns(table, meant) or head_of_tests(table, meant):
+        return table
+    columns = zip_longest(*(row.cells for row in table.rows), fillvalue="")
+    sheet = f"{table.sheet} (columns as rows)".strip()
+    rows = [TableRow(number, cells) for number, cells in enumerate(columns, 1) if any(cells)]
+    return replace(table, rows=rows, sheet=sheet, merged=frozenset()).assuming("each column is a test")
 
 
 @dataclass(frozen=True)
@@ -109,12 +120,12 @@ class RowPerTestReader:
 
     def _is_table(self, table: CellTable) -> bool:
         meant = self.vocabulary.synonyms
-        first = one_row_a_test(separate_tables(table, meant)[0])
+        first = one_row_a_test(separate_tables(table, meant)[0], meant)
         return head_of_tests(first, meant) is not None or stands_in_columns(first, meant)
 
     def read(self, path: Path) -> list[History]:
         """Return one history a row, in the order of the rows; of a spreadsheet those of all its tables of tests."""
-        errors, places, histories = list[HistoryError](), dict[str, str](), list[History]()
+        errors, places, histories = list[HistoryError](), dict[str, str](), dict[str, History]()
         for table in self.tables(path, errors):
             if not table.is_understood:
                 continue
@@ -125,25 +136,22 @@ class RowPerTestReader:
                 history = collected(errors, partial(self._history, table, row, end))
                 if history is None:
                     continue
-                place = table.table.location(row.line)
-                if history.name in places:
-                    what = f"test '{history.name}' already stands in {places[history.name]}"
+                name, place = history.name, table.table.location(row.line)
+                whole = _with_rate_of_another(histories[name], history) if name in places else history
+                if whole is None:
+                    what = f"test '{name}' already stands in {places[name]}"
                     errors.append(HistoryError(f"{place}: {what}; give each row its own name"))
-                else:
-                    places[history.name] = place
-                    histories.append(history)
+                    continue
+                histories[name] = whole
+                places.setdefault(name, place)
         raise_all(errors)
-        return histories
+        return [*histories.values()]
 
     def tables(self, path: Path, errors: list[HistoryError]) -> list[TestTable]:
         """The tables of tests in a file; HistoryError where there is none. errors : to which others are added."""
         meant = self.vocabulary.synonyms
         found = [(table, head_of_tests(table, meant)) for table in tables_of(path, meant)]
         if not any(head for _, head in found):
-            for table, _ in found:
-                if stands_in_columns(table, meant):
-                    what = "each test stands in a column; transpose the table, so that each stands in a row"
-                    raise HistoryError(f"{table.place}: {what}")
             raise HistoryError(
                 f"{path}: no row names the columns of tests; name a stress or temperature, and a rate or a time, such "
                 "as stress_MPa,temperature_C,rupture_h"
@@ -191,12 +199,25 @@ class RowPerTestReader:
         if measure := _includes_elastic(table):
             entries.setdefault("includes_elastic", SourceText(measure, location))
         rows = [TableRow(row.line, (repr(time), repr(strain), "1")) for time, strain in frames]
-        if "end_time" in cells and cells["ended"].entry.text == STOPPED:  # after the last frame, with its strain
+        if "end_time" in cells and "ended" not in entries:
+            what = f"'{cells['end_time'].entry.key}' {UNSAID_END}"
+            raise sheet.question(what, "ended", RUPTURED, STOPPED, line=row.line)
+        if "end_time" in cells and entries["ended"].text == STOPPED:  # after the last frame, with its strain
             last = cells["end_time"].seconds()
             rows += [TableRow(row.line, (repr(last), repr(frames[-1][1]), "0"))] * (last > frames[-1][0])
         columns = ("time_s", "strain_1", "used")
         text = CellTable(sheet.path, rows, sheet.sheet, columns=columns, columns_line=row.line)
         return assemble_history(name, entries, text, self.vocabulary, location=location, source=source)
+
+
+def _with_rate_of_another(one: History, other: History) -> History | None:
+    """A test whose minimum rate and whose curve or end stand in two tables; None where both state one of them."""
+    rates = [test for test in (one, other) if test.minimum_rate is not None and not (test.outputs or test.end_known)]
+    if len(rates) != 1 or one.condition != other.condition:
+        return None
+    (rest,) = (test for test in (one, other) if test is not rates[0])
+    stated = {"minimum_rate": rates[0].minimum_rate, "minimum_rate_sd": rates[0].minimum_rate_sd}
+    return rest.replace(**stated, labels={**rates[0].labels, **rest.labels}) if rest.minimum_rate is None else None
 
 
 TEST_TABLE = RowPerTestReader(
@@ -474,10 +495,10 @@ _DEEPEST, _SEARCHED = 4, 60
 """Rows of a head; and within which the matrix must begin."""
 
 
-def one_row_a_test(table: CellTable) -> CellTable:
+def one_row_a_test(table: CellTable, meant: Mapping[str, str]) -> CellTable:
     """A matrix of rupture times as a table with one row a test; any other table as it is."""
     rows, dialect = table.rows, table.dialect
-    for at, row in enumerate(rows[:_SEARCHED]):
+    for at, row in enumerate(() if head_of_tests(table, meant) else rows[:_SEARCHED]):
         above = [cell for one in rows[max(0, at - _DEEPEST) : at] for cell in one.cells if cell]
         is_named = not is_number_like(row.cells[0], dialect)  # the row of an axis; a test begins with a number
         is_axis = any(len(_axis(row.cells[1:], kind)[0]) > 1 for kind in _AXES.values())

@@ -136,6 +136,11 @@ def split_written_name(text: str, is_unit: Callable[[str], object] = unit_suffix
     return text, ""
 
 
+def is_symbol(text: str, unit: str) -> bool:
+    """Whether what stands behind a name as its unit may be its symbol, as in `Prüfkraft F`."""
+    return len(unit) == 1 and unit.isupper() and text.rstrip(": ").endswith(f" {unit}")
+
+
 def words_of(name: str) -> str:
     """A name in small letters, with single blanks between its words."""
     return plain_name(name).replace("_", " ")
@@ -195,6 +200,8 @@ class NameTable:
             quantity = "elongation"
         elif quantity == "force" and unit_suffix(unit) in STRESS.units and "stress" in self.kinds:
             quantity = "stress"
+        elif quantity and is_symbol(text, unit) and quantity in self.kinds and unit not in self.kinds[quantity].units:
+            unit = ""
         if quantity is None or (unit and quantity not in self.kinds):
             last = re.split(r"[\s_\-()\[\],]+", text.strip(" )]"))[-1]
             return text if last in ("1", *CAPITALS_THAT_MATTER) else self._plain_keys.get(plain_name(text), text)

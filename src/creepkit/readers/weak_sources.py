@@ -27,6 +27,13 @@ _RANGE = re.compile(r"(?<![^\W_])\d[\d.,]*\s*(?:to|bis|à|and|und|et|or|oder|-|�
 """What makes a number the last one of several."""
 
 
+_NUMBERED = re.compile(
+    r"(?:test|versuch|essai|prova|specimen|probe|sample|bar|run|heat|charge|alloy|inconel|incoloy|nimonic|haynes|type|no|nr)\.?\s*$",
+    re.IGNORECASE,
+)
+"""What makes a number before a comma that of a test or an alloy, and none of a range: `Alloy 617, 800 °C`."""
+
+
 _OF_THE_MATERIAL = re.compile(
     r"normali[sz]|temper(?:ed|ing)|anneal|(?<![^\W_])(?:ag(?:e?ing|ed)|cur(?:ed|ing))(?![^\W\d_])|solution|reflow|sinter"
     r"|quench|forg|\brolled|\bhip(?:ped)?\b|heat.?treat"
@@ -93,7 +100,8 @@ def conditions_in_text(text: str, place: str, known: Terms, *, is_name: bool = F
     is_all = not _VALUE.sub("", rest).strip(" ,;/|@()-–_")  # a sheet called "25 °C"
     for match in _VALUE.finditer(rest):
         quantity = _quantity_of(match[2], known)
-        is_range = _RANGE.search(rest[: match.start()]) is not None
+        several = _RANGE.search(rest[: match.start()])
+        is_range = several is not None and not _NUMBERED.search(rest[: several.start()])
         number = float(match[1].replace(",", "."))
         is_at = is_all or _AT_TEST.search(rest[: match.start()]) is not None
         is_at |= is_name and number >= _ROOM and "temperature" not in found

@@ -49,4 +49,4 @@ class ClockAlignment(Presentable):
         """
         return np.asarray(record_times, dtype=float) - self.lag + self.zero
 
-    shown_by = "instrument_records.alignment_text"
+    shown_by = "extraction.alignment_text"

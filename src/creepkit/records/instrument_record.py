@@ -125,6 +125,6 @@ class InstrumentRecord(Presentable, Plotted):
             raise HistoryError(f"{self.origin}: channel '{channel}' holds no reading after time zero")
         return recorded_program(times[later], values[later], tolerance)
 
-    drawn_by = "instrument_records.record_figure", "instrument_records.draw_record"
+    drawn_by = "extraction.record_figure", "extraction.draw_record"
 
-    shown_by = "instrument_records.record_text"
+    shown_by = "extraction.record_text"

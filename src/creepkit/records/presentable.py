@@ -20,6 +20,12 @@ def function_of_reports(name: str) -> Callable[..., Any]:
     return found
 
 
+def text_by(name: str, record: object) -> str:
+    """The text of a record by a function that gives text, an Answer, or a list of blocks."""
+    found = function_of_reports(name)(record)
+    return str(function_of_reports("blocks.as_text")(found) if isinstance(found, list) else found)
+
+
 class NotebookCell:
     """A record that a notebook shows as HTML."""
 
@@ -32,7 +38,7 @@ class NotebookCell:
 class Presentable(NotebookCell):
     """A record that prints an answer of its own, in notebooks too; one of long answers has `details()`.
 
-    shown_by : the function of creepkit.reports that gives text or Answer, of those that have no `__str__` of their own.
+    shown_by : the function of creepkit.reports that gives text, Answer or blocks, of those that have no `__str__`.
     detailed_by : that of its details, where these are more than the text.
     """
 
@@ -41,11 +47,11 @@ class Presentable(NotebookCell):
     detailed_by: ClassVar[str] = ""
 
     def __str__(self) -> str:
-        return str(function_of_reports(self.shown_by)(self)) if self.shown_by else repr(self)
+        return text_by(self.shown_by, self) if self.shown_by else repr(self)
 
     def details(self) -> str:
         """Everything that there is to say, as text."""
-        return str(function_of_reports(self.detailed_by)(self)) if self.detailed_by else str(self)
+        return text_by(self.detailed_by, self) if self.detailed_by else str(self)
 
 
 class Plotted:

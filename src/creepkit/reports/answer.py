@@ -20,16 +20,16 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
 from creepkit.language import strain, temperature, time
 from creepkit.language.printing import expression_text, state_equations
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
+from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.loading import held_of
 from creepkit.records.units import celsius_text, hours_number, time_text
 from creepkit.reports import words
+from creepkit.reports.advice import cautions, next_step
 from creepkit.reports.blocks import MOST_NAMED, Answer, Cell, Rich, Table, as_text, listed, number, plural, printable
-from creepkit.reports.cautions import cautions
 from creepkit.reports.description import headline_role, mean_misfit_text, tested_range, tests_text
-from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import PERCENT_PER_HOUR, compared_minimum_rates, exponents
 from creepkit.reports.verdicts import same_functions, verdict_text
+from creepkit.reports.wording import shown_unit
 
 if TYPE_CHECKING:
     from creepkit.experiments.planned_design import Design
@@ -123,7 +123,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     of_heat = (heat, heat - error, heat + error)
     where = f"{words.OVER_ALL_TESTS}, {tested_range(fit)}"
     by_rates = _with_interval("activation energy", where, of_heat, 1e-3, "kJ/mol")
-    if fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests:
+    misfit = fit.adequacy is not None and fit.adequacy.rejects and not fit.adequacy.lies_in_tests
+    if misfit and math.isfinite(measured):
         by_law = f"{predicted:.2g} by the law" if math.isfinite(predicted) else ""
         interval = (measured, measured - half, measured + half)
         found = [KeyFigure("stress exponent", where, *interval, remark=by_law), *_lives(fit)]
@@ -141,7 +142,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         figures.append(_with_interval("activation energy", at, energy, 1e-3, "kJ/mol", by_tests))
     included = "with errors of tests" if any(one.included for one in fit.unmodelled) else ""
     rate_figure = _with_interval("creep rate", at, rate, PERCENT_PER_HOUR, "%/h", included)
-    return [figures[0], *_lives(fit), *figures[1:], rate_figure]
+    figures = [figures[0], *_lives(fit), *figures[1:], rate_figure]
+    return [replace(one, remark=words.BY_REJECTED) if misfit and not one.remark else one for one in figures]
 
 
 def _lives(fit: Identification) -> list[KeyFigure]:
@@ -210,7 +212,7 @@ def end_figures(test: TestForecast) -> Iterator[KeyFigure]:
     """What the outputs of a test show at its end, or before it where they are predicted no longer."""
     for name, one in test.outputs.items():
         known = np.flatnonzero(np.isfinite(one.value))
-        unit, factor = ("%", 100.0) if is_logarithmic(name) else (output_unit(name), 1.0)
+        factor, unit = shown_unit(name)
         for k in known[-1:]:
             label = f"{name.replace('_', ' ')} at {time_text(float(one.times[k]))}"
             values = (one.value[k], one.band.low[k], one.band.high[k])
@@ -268,7 +270,7 @@ def _reason_of_bounds(one: Any) -> str:
 def _of_mean(name: str, at: str, value: Any, unit: str, one: Any, count: int) -> KeyFigure:
     """count : of tests that ruptured or ran out, from which it is."""
     low, high = known_bounds(one)
-    remark = f"mean of methods, {plural(count, 'rupture test')}{', extrapolated' * bool(one.extrapolation)}"
+    remark = f"{plural(count, 'rupture test')}{', extrapolated' * bool(one.extrapolation)}"
     remark = "; ".join(filter(None, (remark, _reason_of_bounds(one))))
     return KeyFigure(name, f"{celsius_text(one.temperature, digits=0)}, {at}", value, low, high, unit, remark)
 
@@ -345,8 +347,7 @@ def table_of_groups(groups: Mapping[str, tuple[Identification, bool | None]]) ->
         numbers = (figures.get("stress exponent", "–"), rate, stress)
         rows.append((name, titled_law(fit.law), *numbers, f"{verdict_text(fit.adequacy)}{choice}"))
     columns = ("material", "best law", "stress exponent", "creep rate, %/h", "at MPa", "by the noise of the tests")
-    caption = "in brackets: 95 % intervals; of a law that the tests reject the slope of measured rates, and no rate"
-    return Table(caption, columns, rows)
+    return Table("in brackets: 95 % intervals; of a law that is rejected the slope of measured rates", columns, rows)
 
 
 def chosen_text(ranking: Ranking) -> str:
@@ -358,7 +359,7 @@ def chosen_text(ranking: Ranking) -> str:
     weights = f"weights: {', '.join(known)}{others}"
     if len(known) == 1:
         same = len(ranking.laws) - len(laws)
-        become = f", {same} of which become it" if same else ""
+        become = f"; {same} of them become{'s' * (same == 1)} the same function" if same else ""
         weights = f"weight {laws[0].weight:.2f} among {plural(len(ranking.laws), 'law')}{become}"
     return f"{'decisive' if ranking.decisive else 'not decisive'}; {weights}"
 
@@ -449,9 +450,9 @@ def reference_sentences(fit: Identification) -> list[str]:
     r, state, held = fit.tested_point, _state(fit), held_quantities(fit)
     lines = []
     if state is not None:
-        hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time))
+        hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time), "h")
         at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
-        lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours} h")
+        lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours}")
     if held and (held != "strain" or state is None):
         formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
         lines.append(f"at constant {held} the slope of the law's formula over stress is {formula}")
@@ -464,10 +465,11 @@ def interval_text(values: Sequence[float], unit: str = "") -> str:
 
     The value alone where an end is not known; an end that is infinite in words.
     """
-    known = not (any(map(math.isnan, values[1:])) or math.isinf(values[1]))
+    known = not any(map(math.isnan, values[1:]))
     behind = f" {unit}" if unit and not math.isinf(values[0]) else ""
     digits = interval_digits(*values) if known else 2
-    value, *ends = (_written_out(v, digits) if not math.isinf(v) else BEYOND.get(unit, "no limit") for v in values)
+    beyond = {-math.inf: "none", math.inf: BEYOND.get(unit, "no limit")}
+    value, *ends = (beyond.get(v) or _written_out(v, digits) for v in values)
     return f"{value}{behind} [{', '.join(ends)}]" if known else f"{value}{behind}"
 
 

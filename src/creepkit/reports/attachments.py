@@ -82,7 +82,5 @@ def _problem(files: Sequence[tuple[str, int]]) -> str:
 
 def problem_of_names(names: Iterable[str]) -> str:
     """Why one of these names is not a plain relative POSIX path, as a clause; "" where all are."""
-    for name in names:
-        if not (name.isprintable() and PLAIN_NAME.fullmatch(name)):
-            return f"the name '{quoted(name)}' is not a plain path below a folder, such as data/test_1.csv"
-    return ""
+    odd = [quoted(name) for name in names if not (name.isprintable() and PLAIN_NAME.fullmatch(name))]
+    return f"the name '{odd[0]}' is not a plain path below a folder, such as data/test_1.csv" if odd else ""

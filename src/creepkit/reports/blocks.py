@@ -288,12 +288,16 @@ def typeset(text: str) -> str:
 
     No line ends between a number and its unit.
     """
-    text = _POWER.sub(_with_power, text.replace(" +- ", " ± "))
+    text = _POWER.sub(_with_power, _P_VALUE.sub("\u00a0\\1\u00a0", text.replace(" +- ", " ± ")))
     return _UNIT.sub("\u00a0", _INFINITE.sub("∞", _MINUS.sub("−", text)))
 
 
-_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?![\w.])", re.ASCII)
+_POWER = re.compile(r"(?<![\w.+-])(-?\d+(?:\.\d+)?)e([+-]\d\d+)(?!\w|\.\d)", re.ASCII)
 """A number as programs print it, such as 4.2e-05."""
+
+
+_P_VALUE = re.compile(r"(?<=\bp) ([=<]) (?=\d)")
+"""Within "p = 0.28", where no line ends."""
 
 
 _MINUS, _INFINITE = re.compile(r"(?:^|(?<=[\[( ]))-(?=[\d∞]|inf\b)"), re.compile(r"(?:^|(?<=[\[( −]))inf\b")
@@ -360,17 +364,13 @@ def _answer_lines(answer: Answer) -> list[str]:
 
     So do mean misfits, and then the intervals of values, where they would leave no room for one figure and one remark.
     """
-    figures = [
-        f"{name}{at and (' ' if at.startswith(OVER_ALL_TESTS) else ' at ')}{at}: {value}{note and ', '}{note}"
-        for name, at, value, note in answer.figures
-    ]
     end, lines = _indented(f"next: {answer.next_step}; more: {answer.more}"), list[str]()
     end = end if len(end) == 1 else [*_indented(f"next: {answer.next_step}"), f"  more: {answer.more}"]
     tests, _, misfits = answer.tests.partition("; ")
-    for intervals, said_of_tests, kept in (
-        *(((True, answer.tests, 1),) if misfits else ()),
-        *((one, tests, 1) for one in (True, False)),
-        *((one, tests, 0) for one in (True, False)),
+    for intervals, said_of_tests, notes, kept, fewest in (
+        *(((True, answer.tests, True, 1, 1),) if misfits else ()),
+        *((one, tests, True, 1, 1) for one in (True, False)),
+        *((False, tests, False, *least) for least in ((1, 1), (0, 1), (1, 0), (0, 0))),
     ):
         head = _indented(f"{answer.headline} ({said_of_tests})" if said_of_tests else answer.headline, "")
         pieces = [
@@ -380,9 +380,14 @@ def _answer_lines(answer: Answer) -> list[str]:
         elsewhere = ALL_DIGITS.format(more="" if intervals else " and intervals")
         pieces += [f"({answer.units}; {elsewhere})"] if pieces else []
         law = [line for text in (*map(str, answer.equations), "   ".join(pieces)) for line in _indented(text)]
-        said, warned = [*map(_indented, figures)], [_indented(f"- {text}") for text in answer.cautions]
+        said = [
+            _indented(f"{name}{at and (' ' if at.startswith(OVER_ALL_TESTS) else ' at ')}{at}: {value}{note}")
+            for name, at, value, remark in answer.figures
+            for note in [f", {remark}" if remark and notes else ""]
+        ]
+        warned = [_indented(f"- {text}") for text in answer.cautions]
         remarks = [*map(_indented, answer.remarks)]
-        for parts, least in ((warned, 1), (said, 1), (remarks, kept), *[(said, 0)] * (not intervals)):
+        for parts, least in ((warned, 1), (said, 1), (remarks, kept), (said, fewest)):
             while len(parts) > least and sum(map(len, (head, *remarks, law, *said, *warned, end))) > MOST_LINES:
                 parts.pop()
         lines = [*head, *chain(*remarks), *law, *chain(*said, *warned), *end]

@@ -6,9 +6,10 @@ one chi-square for the tables, figures and alternative texts of a report.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import wraps
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from creepkit.inverse.goodness_of_fit import TestFit
     from creepkit.inverse.identification import Identification
     from creepkit.records import History
+
+
+T = TypeVar("T")
 
 
 class ReadingCounts(NamedTuple):
@@ -82,10 +86,7 @@ OWN_RATE_CHI_SQUARE = (
 """What the chi-square of a test is, wherever one is shown."""
 
 
-LAW_RATE_MISFIT = "mean square misfit over noise² with the law's rate for every test"
-
-
-LAW_RATE_MEANING = f"{LAW_RATE_MISFIT} holds the scatter between tests"
+LAW_RATE_MEANING = "mean square misfit over noise² with the law's rate for every test holds the scatter between tests"
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,18 +136,22 @@ class JudgedReadings:
         return (float(sd.min()), float(sd.max())) if sd.size else None
 
 
-_KNOWN: WeakKeyDictionary[Identification, JudgedReadings | None] = WeakKeyDictionary()
-"""Of identifications that are in use: tables and figures of one report judge the same readings."""
+def once(function: Callable[[Identification], T]) -> Callable[[Identification], T]:
+    """A function of an identification that is called once for each that is in use: a report asks it often."""
+    known: WeakKeyDictionary[Identification, T] = WeakKeyDictionary()
+
+    @wraps(function)
+    def found(fit: Identification) -> T:
+        if fit not in known:
+            known[fit] = function(fit)
+        return known[fit]
+
+    return found
 
 
+@once
 def judged_readings(fit: Identification) -> JudgedReadings | None:
     """The readings by which an identification is judged; None where no noise is known, or its tests are not at hand."""
-    if fit not in _KNOWN:
-        _KNOWN[fit] = _judged_readings(fit)
-    return _KNOWN[fit]
-
-
-def _judged_readings(fit: Identification) -> JudgedReadings | None:
     if not fit.histories or fit.predictor is None:
         return None
     try:

@@ -17,6 +17,7 @@ from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends, plural, plural_of
 from creepkit.reports.verdicts import cause_headline
+from creepkit.reports.wording import first_kind, say
 from creepkit.reports.words import FITS, HEADLINES, MEAN_MISFIT, MISSES, ONE_TEST, TRUTHS
 
 if TYPE_CHECKING:
@@ -70,12 +71,9 @@ class Description:
         known = [(f"rupture times{lost}", self.ruptures), ("minimum creep rates", self.minimum_rates)]
         known += [("creep rates", self.rates)]
         order = sorted(self.outputs, key=lambda name: not is_logarithmic(name))
-        known += [(plural_of(name), _as_ln(name, self.outputs[name])) for name in order]
+        as_ln = {name: error if is_logarithmic(name) else np.log1p(error) for name, error in self.outputs.items()}
+        known += [(plural_of(name), float(as_ln[name])) for name in order]
         return [(name, value) for name, value in known if np.isfinite(value)][:MOST_DESCRIBED]
-
-
-def _as_ln(output: str, error: float) -> float:
-    return error if is_logarithmic(output) else float(np.log1p(error))
 
 
 def spread_text(spread: float) -> str:
@@ -157,9 +155,8 @@ def headline_kind(fit: Identification) -> str:
     good, bad = _usable(items), _usable(items, False)
     if not (fit.converged or in_tests):  # a cause goes before the search
         return "not found"
-    if not good:
-        return "use nothing" if bad else "fitted"
-    return "use in part" if bad else "use only" if rejected(fit) and not in_tests else "use"
+    only = rejected(fit) and not in_tests
+    return first_kind({"use in part": good and bad, "use nothing": bad, "fitted": not good, "use only": only}) or "use"
 
 
 def headline_role(fit: Identification) -> str:
@@ -202,14 +199,9 @@ def _truth(fit: Identification) -> str:
     """Whether the law could be the true one."""
     adequacy = fit.adequacy
     if adequacy is None or adequacy.verdict == "cannot be judged":
-        kind = "not judged"
-    elif adequacy.explains:
-        kind = "explains"
-    elif adequacy.lies_in_tests:
-        return TRUTHS["in tests"].format(cause=cause_headline(adequacy.explanations[0]))
-    else:
-        kind = "rejected"
-    return TRUTHS[kind]
+        return TRUTHS["not judged"]
+    kind = first_kind({"explains": adequacy.explains, "in tests": adequacy.lies_in_tests, "rejected": True})
+    return say(TRUTHS[kind], cause="".join(map(cause_headline, adequacy.explanations[:1])))
 
 
 def _spread(ratios: list[float]) -> float:

@@ -11,7 +11,7 @@ from creepkit.experiments.planned_design import ALIKE, USEFUL_PROBABILITY, kind_
 from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.records import SECONDS_PER_HOUR, load_unit
 from creepkit.reports.answer import MOST_CAUTIONS
-from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, plural
+from creepkit.reports.blocks import Answer, Block, Items, Table, listed, plural
 from creepkit.reports.figures import panel_grid, wrapped
 from creepkit.reports.words import DESIGN
 
@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 
 ROWS, MOST_NEXT, MOST_TICKS = 8, 3, 8
 """Tests in a table, those named after the first, and labels along an axis of the map."""
-
-
-def design_details(design: Design) -> str:
-    """The answer, with the best tests in a table and what else is to be said."""
-    return as_text(design_blocks(design))
 
 
 def design_sentence(design: Design) -> str:

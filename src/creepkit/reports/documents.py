@@ -83,7 +83,7 @@ def _registered(one: Any) -> Mapping[str, Any]:
 
 
 ALSO: dict[str, Callable[[Any], Mapping[str, Any]]] = {
-    "Challenge": lambda one: {"sentence": function_of_reports("remarks.challenge_text")(one)},
+    "Challenge": lambda one: {"sentence": function_of_reports("verdicts.challenge_text")(one)},
     "Channel": lambda one: {
         "ends": [float(end(one.values)) for end in (np.nanmin, np.nanmax) if one.missing < one.values.size]
     },

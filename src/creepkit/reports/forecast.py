@@ -18,11 +18,11 @@ from creepkit.inverse.reference_conditions import usable_frames
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
 from creepkit.records.units import celsius_text, hours_number
 from creepkit.reports.answer import MOST_CAUTIONS, KeyFigure, asked_figures, end_figures, time_figure
-from creepkit.reports.blocks import Answer, Block, Items, Table, as_text, listed, named, plural
+from creepkit.reports.blocks import Answer, Block, Items, Table, listed, named, plural
 from creepkit.reports.figures import panel_grid, span, wrapped
-from creepkit.reports.load_programs import kind_of_test
-from creepkit.reports.prediction_bands import axis_label, is_compressed
-from creepkit.reports.wording import say
+from creepkit.reports.histories import kind_of_test
+from creepkit.reports.identification_plot import axis_label, side_of
+from creepkit.reports.wording import say, shown_unit
 from creepkit.reports.words import FORECAST
 
 if TYPE_CHECKING:
@@ -38,11 +38,6 @@ if TYPE_CHECKING:
 
 SHOWN_SHARE = 0.02
 """Of the variance: smaller parts of a band are not named."""
-
-
-def forecast_details(forecast: Forecast) -> str:
-    """The answer, with everything that is predicted of each test."""
-    return as_text(forecast_blocks(forecast))
 
 
 def forecast_answer(forecast: Forecast, picture: Block | None = None) -> Answer:
@@ -119,8 +114,9 @@ def _cautions(forecast: Forecast, outside: Sequence[str]) -> list[str]:
 
 
 def _misfit_text(misfit: LawMisfit) -> str:
+    at = f"{misfit.stress:.4g} MPa, {celsius_text(misfit.temperature, digits=0)}"
     factor, here = f"{math.exp(abs(misfit.log_factor)):.3g}", f"{misfit.factor:.3g}"
-    return say(FORECAST["misses"], factor=factor, here=here * (here != "1"))
+    return say(FORECAST["misses"], at=at, factor=factor, here=here * (here != "1"))
 
 
 def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: str = "") -> list[Block]:
@@ -138,8 +134,9 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
         for line in _remarks(test):
             said.setdefault(line, []).append(test.name)
     answer, several = forecast_answer(forecast, drawn), len(forecast.tests) > 1
-    new = {line: names for line, names in said.items() if line not in answer.cautions}
-    lines = [f"{named(names, 'test')}: {line}" if several else line for line, names in new.items()]
+    for caution in answer.cautions:  # what they do not say of it
+        said = {line.removeprefix(caution).removeprefix(". "): names for line, names in said.items()}
+    lines = [f"{named(names, 'test')}: {line}" if several else line for line, names in said.items() if line]
     listed_there = len(answer.figures) + 1 >= len(rows) and not several
     return [answer, *([] if listed_there else [table]), Items(lines)]
 
@@ -147,8 +144,7 @@ def forecast_blocks(forecast: Forecast, figures: PageFigures | None = None, of: 
 def _remarks(test: TestForecast) -> Iterator[str]:
     """What the law misses, a measurement, what the band is made of, what is extrapolated, cautions."""
     if test.misfit is not None:
-        where = f"{test.misfit.stress:.4g} MPa and {celsius_text(test.misfit.temperature, digits=0)}"
-        yield f"{_misfit_text(test.misfit)}. They are at {where}"
+        yield _misfit_text(test.misfit)
     if test.inside is not None:
         shares, whole = test.inside.share, test.inside.whole
         yield from (f"{100 * share:.0f} % of the readings of {one} lie in the band" for one, share in shares.items())
@@ -233,13 +229,10 @@ def _drawable(forecast: Forecast) -> list[TestForecast]:
     return tests
 
 
-def _scaled(one: OutputForecast) -> float:
-    return 100.0 if is_logarithmic(one.output) else 1.0
-
-
 def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str) -> None:
     """The curve, pointwise and simultaneous bands, the measured points, and intervals of times."""
-    factor, logarithmic = _scaled(one), is_logarithmic(one.output) and not is_compressed(test.history)
+    side = side_of(test.history) if is_logarithmic(one.output) else 0
+    factor, logarithmic = shown_unit(one.output)[0] * (side or 1), side != 0
     positive = one.times > 0
     hours, band = one.times[positive] / SECONDS_PER_HOUR, one.band
     curve, low, high, lowest, highest = (
@@ -261,7 +254,7 @@ def _draw_curve(axes: Axes, test: TestForecast, one: OutputForecast, level: str)
     axes.set_xlim(start, end)  # where the bands end, not beyond
     _draw_times(axes, test, one, level)
     axes.set_title(wrapped(f"{test.name}: {test.history.condition}", 4.4, 11.0), fontsize=8)
-    axes.set_ylabel(axis_label(one.output), fontsize=8)
+    axes.set_ylabel(axis_label(one.output, test.history), fontsize=8)
     axes.set_xlabel("time, h", fontsize=8)
     axes.tick_params(labelsize=7)
 
@@ -281,7 +274,7 @@ def _draw_times(axes: Axes, test: TestForecast, one: OutputForecast, interval: s
     edge = top - BELOW_EDGE * (top - bottom) if is_linear else top * (bottom / top) ** BELOW_EDGE
     for time in test.times:
         is_rupture = not time.output
-        level = edge if is_rupture else _scaled(one) * time.target
+        level = edge if is_rupture else shown_unit(one.output)[0] * time.target
         low, median, high, measured = (v / SECONDS_PER_HOUR for v in (time.low, time.median, time.high, time.measured))
         if time.output not in ("", one.output) or not bottom <= level <= top or not low <= right:
             continue

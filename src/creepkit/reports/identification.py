@@ -1,4 +1,4 @@
-"""What an identification says beyond its answer: values and verdict, tests, noise and nuisance parameters."""
+"""What an identification says beyond its answer: values and verdict, tests, noise, and texts of what follows it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
-from creepkit.inverse.noise_model import MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import beyond_intervals, nuisance_unit
 from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.inverse.uncertainty.correlation import STRONG_CORRELATION, Correlation
 from creepkit.inverse.uncertainty.laplace_approximation import interval_ends
 from creepkit.records import SECONDS_PER_HOUR, is_logarithmic, output_unit
 from creepkit.records.units import celsius_text
+from creepkit.reports.advice import cautions
 from creepkit.reports.answer import (
     MOST_CAUTIONS,
     chosen_text,
@@ -27,10 +26,25 @@ from creepkit.reports.answer import (
     key_figures,
     reference_sentences,
     symbols_of,
+    unit_text,
     value_cells,
 )
-from creepkit.reports.blocks import Block, Cell, Formula, Items, Paragraph, Table, as_text, first_of, number, plural
-from creepkit.reports.cautions import cautions
+from creepkit.reports.blocks import (
+    Block,
+    Cell,
+    Formula,
+    Items,
+    Paragraph,
+    Table,
+    aligned,
+    as_text,
+    ends,
+    first_of,
+    listed,
+    named,
+    number,
+    plural,
+)
 from creepkit.reports.compared_values import (
     LAW_RATE_MEANING,
     OWN_RATE_CHI_SQUARE,
@@ -40,16 +54,23 @@ from creepkit.reports.compared_values import (
 )
 from creepkit.reports.description import mean_misfit_text, rejected
 from creepkit.reports.identification_plot import residual_caption, small_multiples
-from creepkit.reports.rate_panels import rupture_rows
-from creepkit.reports.remarks import perturbation_text, remarks
+from creepkit.reports.methods import rate_scatter_sentence
+from creepkit.reports.rate_panels import PERCENT_PER_HOUR, rupture_rows
+from creepkit.reports.verdicts import perturbation_text, remarks
+from creepkit.reports.wording import amount_text, shown_unit
 
 if TYPE_CHECKING:
+    from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
-    from creepkit.inverse.selection.ranking import Ranking
+    from creepkit.inverse.selection.ranking import ModelAverage, Ranking
     from creepkit.inverse.single_values import SingleValue
+    from creepkit.inverse.sparsity.result import Sparsity
+    from creepkit.inverse.uncertainty.correlation import Correlation
+    from creepkit.inverse.uncertainty.importance_sampling import PosteriorSamples
     from creepkit.inverse.uncertainty.laplace_approximation import Estimate
     from creepkit.reports.svg import PageFigures
+
 
 MOST_NAMED = 12
 """Tests, or temperatures, that are named in a sentence."""
@@ -221,7 +242,6 @@ def _table_of_tests(fit: Identification) -> Table:
     observations, readings = compared_observations(fit), judged_readings(fit)
     for k, test in enumerate(fit.tests):
         first, end = test.outputs[0] if test.outputs else None, test.rupture
-        unit = f" {output_unit(first.output)}" if first is not None and output_unit(first.output) else ""
         rows.append(
             (
                 test.name,
@@ -230,26 +250,27 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if readings is None else number(readings.chi_square(k), 3),
                 "–" if readings is None else number(readings.misfit_of_common_rate(k), 3),
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
-                "–" if first is None else f"{number(first.offset, 2)}{unit}",
+                "–" if first is None else amount_text(first.offset, first.output),
                 number(test.rate_factor, 3),
-                *_single_cells(None if first is not None else test.minimum_rate),
+                *_single_cells(None if first is not None else test.minimum_rate, 1.0 / PERCENT_PER_HOUR),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "minimum rate, 1/s", "by the law", "law / measured"),
+        *("rate × law", "minimum rate, %/h", "by the law, %/h", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
-    caption = (
-        f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}. Relative squared error and offset of the first "
-        "output with the law's rate; a dash: no value is predicted at some readings, as after a rupture"
-    )
-    if any(t.minimum_rate or t.rupture for t in fit.tests):
-        caption += f". Lives: > marks tests that were stopped; 95 % intervals of a single test{_if_the_law_holds(fit)}"
-    if any(t.rupture and not t.rupture.used for t in fit.tests):
-        caption += "; the law was identified without the ends of some tests"
-    return Table(caption, columns, rows)
+    of_curves = "relative squared error and offset of the first output with the law's rate; a dash: no value is "
+    of_lives = "> marks tests that were stopped; in brackets: 95 % intervals of a single test"
+    without_ends = any(t.rupture and not t.rupture.used for t in fit.tests)
+    captions = {
+        f"{OWN_RATE_CHI_SQUARE}. Beside it the {LAW_RATE_MEANING}": readings is not None,
+        f"{of_curves}predicted at some readings, as after a rupture": any(t.outputs for t in fit.tests),
+        f"{of_lives}{_if_the_law_holds(fit)}": any(t.minimum_rate or t.rupture for t in fit.tests),
+        "the law was identified without the ends of some tests": without_ends,
+    }
+    return Table(". ".join(f"{one[0].upper()}{one[1:]}" for one, said in captions.items() if said), columns, rows)
 
 
 def _sums(fit: Identification) -> list[str]:
@@ -260,7 +281,7 @@ def _sums(fit: Identification) -> list[str]:
         label = "rms distance in ln strain and ln time" if ruptures else "rms of ln strain"
         lines.append(f"{plural(len(tests), 'test')}, {sum(m.frames for m in tests)} readings: {label} {fit.rms:.3g}")
     rates = [m.minimum_rate for m in fit.tests if m.minimum_rate is not None]
-    for what, values in (("minimum rates of tests without frames", rates), ("rupture times", ruptures)):
+    for what, values in (("minimum rates of tests without curves", rates), ("rupture times", ruptures)):
         known = [one.ratio for one in values if not one.censored and math.isfinite(one.ratio)]
         inside = sum(one.low <= one.measured <= one.high for one in values if not one.censored)
         if known:
@@ -287,10 +308,10 @@ def _without_misfit(fit: Identification) -> list[str]:
     readings = judged_readings(fit)
     if readings is None:
         if not fit.histories or fit.predictor is None:
-            return ["χ² is not known: the tests were not given with this identification"]
-        return ["χ² is not known: nor is the noise of a reading, well enough to judge by"]
+            return ["no χ² is known: the tests were not given with this identification"]
+        return ["no χ² is known: the noise of a reading is not, well enough to judge by"]
     others = [t.name for k, t in enumerate(fit.tests) if t.outputs and not readings.mask(k).any()]
-    said = f"χ² is a dash where the noise of a reading is not known: {first_of(others, MOST_NAMED)}"
+    said = f"a dash stands for χ² where the noise of a reading is not known: {first_of(others, MOST_NAMED)}"
     return [said] if others else []
 
 
@@ -302,34 +323,42 @@ def logarithmic_output(fit: Identification) -> str:
 # ---- tests without curves --------------------------------------------------------------------------------------------
 
 
-def _single_cells(one: SingleValue | None, unit: float = 1.0) -> tuple[str, str, str]:
+def _single_cells(one: SingleValue | None, unit: float) -> tuple[str, str, str]:
     """What was measured, what the law predicts with its interval, and their ratio; unit : of the cells."""
     if one is None:
         return ("", "", "")
-    low, predicted, high, measured = (number(v / unit) for v in (one.low, one.predicted, one.high, one.measured))
+    low, predicted, high = (number(v / unit, 3) for v in (one.low, one.predicted, one.high))
     by_law = f"{predicted} [{low}, {high}]" if math.isfinite(one.predicted) else "none"
     known = math.isfinite(one.ratio) and not one.censored
-    return f"{'> ' * one.censored}{measured}", by_law, number(one.ratio, 3) if known else ""
+    return f"{'> ' * one.censored}{number(one.measured / unit)}", by_law, number(one.ratio, 3) if known else ""
 
 
 # ---- noise and nuisance parameters -----------------------------------------------------------------------------------
 
 
+SMALLEST_SHARE = 5e-4
+"""Of strain, from which on it is said that the law cannot follow it."""
+
+
 def noise_blocks(fit: Identification) -> list[Block]:
     """Noise, scatter and misfits as they were estimated, explicit nuisance parameters, and correlations."""
-    rows = []
+    rows, readings = [], judged_readings(fit)
     for name, one in fit.noise_model.outputs.items():
         error = fit.errors.get(name) if name != RUPTURE_OUTPUT and not is_logarithmic(name) else None
         rms = "–" if error is None else f"{error.mean_squared_error**0.5:.3g} ({100 * error.relative_rms_error:.2g} %)"
         squared = "–" if error is None else number(error.relative_squared_error, 3)
-        sizes = {"of a reading": _judged_noise(fit, name), "in the fit": number(one.noise, 2)}
-        sizes |= {"offset of a test": number(one.offset, 2), "rms misfit": rms, "squared error": squared}
-        rows.append({"output": name.replace("_", " "), "unit": output_unit(name) or "1", **sizes})
+        (factor, unit), judged = shown_unit(name), None if readings is None else readings.noise(output=name)
+        of_reading = "–" if judged is None else ends(factor * np.array(judged), 2)
+        sizes = {"of a reading": of_reading, "in the fit": number(factor * one.noise, 2)}
+        sizes |= {"offset of a test": number(factor * one.offset, 2), "rms misfit": rms, "squared error": squared}
+        if {*sizes.values()} - {"–", "0"}:
+            rows.append({"output": name.replace("_", " "), "unit": unit or "1", **sizes})
     blocks: list[Block] = [Paragraph(rate_scatter_sentence(fit))]
     if name := logarithmic_output(fit):
         part = fit.noise_model[name]
         share = math.hypot(RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, part.drift, part.misfit)
-        blocks.append(Paragraph(f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"))
+        text = f"what the law cannot follow of a curve is {100 * share:.1f} % of strain"
+        blocks += [Paragraph(text)] * (share >= SMALLEST_SHARE)
     caption = (
         "noise as it was estimated, one standard deviation. Of a reading: by which the law is judged, from what "
         "its test states or its neighbours show. In the fit: one for all. Misfit and error: what the law leaves"
@@ -350,32 +379,6 @@ def noise_blocks(fit: Identification) -> list[Block]:
     ]
     tables = [Table.of(caption, rows), Table.of("nuisance parameters estimated beside the law", nuisances)]
     return [*blocks, *(table for table in tables if table.rows), *_correlations(fit)]
-
-
-def rate_scatter_sentence(fit: Identification) -> str:
-    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
-    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
-    if not rates:
-        return "No scatter of creep rates between tests was allowed: every test follows the law's own rate."
-    size = f"{number(100 * fit.noise_model.rate, 3)} % about the law (one standard deviation of their logarithm)"
-    if rates[0].sd is not None:
-        return f"The creep rates of single tests have a Gaussian prior: they scatter by {size}, as was given."
-    if len(fit.tests) < MINIMUM_TESTS:
-        cannot = f"{plural(len(fit.tests), 'test')} cannot show it"
-        return f"How the creep rates of single tests scatter is not known, for {cannot}: the intervals hold for these."
-    if fit.noise_model.rate <= UNDETECTED_SCATTER:
-        return "No scatter of the creep rates of single tests about the law was detected."
-    return f"The creep rates of single tests scatter by {size}, as was estimated."
-
-
-def _judged_noise(fit: Identification, output: str) -> str:
-    """The noise of a reading by which the law is judged; its ends where readings differ."""
-    readings = judged_readings(fit)
-    ends = None if readings is None else readings.noise(output=output)
-    if ends is None:
-        return "–"
-    low, high = (number(end, 2) for end in ends)
-    return low if low == high else f"{low} to {high}"
 
 
 def _nuisance_unit(nuisance: NuisanceEstimate, fit: Identification) -> str:
@@ -408,8 +411,8 @@ def _correlations(fit: Identification) -> list[Block]:
 
 def correlation_table(correlation: Correlation, caption: str = "") -> Table:
     """The matrix with its names."""
-    names = correlation.names
-    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, correlation.matrix, strict=True)]
+    names, matrix = correlation.names, np.round(correlation.matrix, 3) + 0.0
+    rows = [(name, *(number(float(v), 3) for v in row)) for name, row in zip(names, matrix, strict=True)]
     return Table(caption, ("parameter", *names), rows)
 
 
@@ -453,3 +456,83 @@ def _range_lines(fit: Identification) -> list[str]:
         others = f"; and {more} more temperatures" if more > 0 else ""
         lines.append(f"not every combination of stress and temperature in this range was tested: at {named}{others}")
     return lines
+
+
+# ---- term selection --------------------------------------------------------------------------------------------------
+
+
+def sparsity_verdict(sparsity: Sparsity) -> str:
+    """What was dropped, and what that cost, in one sentence."""
+    dropped = [f"'{name}'" for name in sparsity.dropped_terms] + [f"exponent {e}" for e in sparsity.exponents_off]
+    if not dropped:
+        return f"all terms of '{sparsity.law}' are kept"
+    cost = (
+        f"chi-square rises by {max(sparsity.chi_square_rise, 0.0):.1f} for {sparsity.parameters_dropped} parameters "
+        f"fewer (p = {sparsity.p_value:.2g}) and -2 ln of the evidence changes by {sparsity.score_difference:+.1f}"
+    )
+    kept = f"{named(sparsity.kept_terms, 'test')} suffice{'s' * (len(sparsity.kept_terms) == 1)}"
+    return f"without {listed(dropped)} of '{sparsity.law}' {cost}: {kept}"
+
+
+def sparsity_text(sparsity: Sparsity) -> str:
+    """The verdict, and the contribution of every term in the whole sum, and after the refit."""
+    kept = sparsity.contributions_after_refit
+    rows = [
+        (term, f"{share:.3f}", f"{kept[term]:.3f}" if term in kept else "dropped")
+        for term, share in sparsity.contributions.items()
+    ]
+    return "\n".join([sparsity.verdict, *aligned(("contribution", "whole sum", "kept"), rows)])
+
+
+# ---- uncertainty -----------------------------------------------------------------------------------------------------
+
+
+def posterior_text(samples: PosteriorSamples) -> str:
+    """The median and 95 % interval of every parameter."""
+    width = max(len(name) for name in samples.coordinates.names)
+    lines = [f"{len(samples.u)} draws from the posterior"]
+    for name, param in samples.coordinates.law.table.items():
+        median, low, high = samples.interval(name)
+        lines.append(f"  {name:{width}} = {median:.5g}  [{low:.4g}, {high:.4g}] {unit_text(param.unit)}".rstrip())
+    return "\n".join(lines)
+
+
+def correlation_text(correlation: Correlation) -> str:
+    """The matrix with its names."""
+    table = correlation_table(correlation)
+    return "\n".join(aligned(table.columns, table.rows, table.numeric))
+
+
+def model_average_text(average: ModelAverage) -> str:
+    """One line: the laws with their weights, rate and local exponent at the reference point."""
+    reference = average.fits[0].reference
+    rate, low, high = (float(v) for v in average.rate(reference.stress))
+    exponent, exponent_low, exponent_high = (float(v) for v in average.local_exponent(reference.stress))
+    names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(average.fits, average.weights, strict=True))
+    return (
+        f"over the laws {names}: rate at {reference.stress:.4g} MPa, {celsius_text(reference.temperature)} {rate:.3g} "
+        f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
+    )
+
+
+# ---- cross-validation ------------------------------------------------------------------------------------------------
+
+
+def cross_validation_text(validation: CrossValidation) -> str:
+    """One line for each held-out test: its relative squared errors, about the mean of the test.
+
+    Of its rupture time and minimum rate the prediction over the measured one, with its 95 % interval.
+    """
+    lines = [f"law '{validation.fit.law.name}', held out by {validation.by}: relative squared errors"]
+    for name, errors in validation.errors.items():
+        cells = [f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items()]
+        cells += [f"{what} {_held_out_text(one)}" for what, one in validation.single_values[name].items()]
+        lines.append(f"  {name}: {', '.join(cells)}")
+    return "\n".join(lines)
+
+
+def _held_out_text(one: SingleValue) -> str:
+    """Predicted over measured, with the interval of a single test."""
+    low, high = one.low / one.measured, one.high / one.measured
+    unbroken = " of the time it lasted unbroken" if one.censored else ""
+    return f"predicted over measured {one.ratio:.3g} [{low:.3g}, {high:.3g}]{unbroken}"

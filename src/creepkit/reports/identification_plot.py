@@ -1,36 +1,38 @@
-"""Plot of an identification: tests over time with bands, creep rates over stress, times to rupture."""
+"""Plot of an identification: tests over time with bands, creep rates over stress, times to rupture; and its curves.
+
+With y(x) a predicted output, x = (u, e) the unknowns (coordinates of the law and nuisance parameters of the tests) and
+C their covariance, its standard deviation is sqrt(dy/dx C dy/dx'). One prediction with sensitivities gives y and dy/dx.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
-from creepkit.records import SECONDS_PER_HOUR, is_logarithmic
+from creepkit.errors import FitError
+from creepkit.inverse.defect_correction import with_correction_at_frames
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, usable_frames
+from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
+from creepkit.records import SECONDS_PER_HOUR, Prediction, is_logarithmic
 from creepkit.records.conditions import condition_values
-from creepkit.reports.compared_values import judged_readings
+from creepkit.reports.compared_values import judged_readings, once
 from creepkit.reports.condition_colours import ColourScale, stress_scale, temperature_scale
-from creepkit.reports.figures import empty_figure, panel_grid, shortened, span, wrapped
-from creepkit.reports.prediction_bands import (
-    FittedCurves,
-    TestCurve,
-    axis_label,
-    curve_of_test,
-    fitted_curves,
-    set_time_range,
-    unit_of,
-)
+from creepkit.reports.figures import empty_figure, panel_grid, set_range, shortened, span, wrapped
 from creepkit.reports.rate_panels import draw_rates, draw_ruptures, has_rates, rupture_rows
+from creepkit.reports.wording import shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from creepkit.inverse.identification import Identification
+    from creepkit.records import History
 
 
 SHOWN_STRAIN_RATIO = 1e-3
@@ -198,7 +200,7 @@ def draw_curve(
     from matplotlib.collections import PolyCollection
 
     # beyond the strains of the test a curve towards rupture says nothing of its frames
-    end = _drawn_end(curve) if curve.logarithmic else np.inf
+    end = _drawn_end(curve)
     axes.add_collection(PolyCollection(curve.bands(end), color=colour, alpha=opacity, lw=0), autolim=False)
     axes.plot(curve.hours, np.where(curve.identified <= end, curve.identified, np.nan), style, lw=1.2, color=colour)
 
@@ -206,7 +208,7 @@ def draw_curve(
 def _drawn_end(curve: TestCurve) -> float:
     """The strain, %, at which the curve of a test ends; infinite where no strain above zero was measured."""
     largest = float(np.nanmax(curve.measured, initial=0.0))
-    return DRAWN_STRAIN_RATIO * largest if largest > 0 else float("inf")
+    return DRAWN_STRAIN_RATIO * largest if curve.logarithmic and largest > 0 else float("inf")
 
 
 def _draw_curves(
@@ -219,17 +221,12 @@ def _draw_curves(
         opacity = 1.0 - (1.0 - BAND_OPACITY) ** (1.0 / alike)  # bands of one condition lie upon each other
         draw_curve(axes, curve, colours[k], "-", colours[k], opacity)
     set_curve_ranges(axes, drawn, output)
-    axes.set(xlabel="time, h", ylabel=axis_label(output))
-
-
-def _drawn_values(curve: TestCurve) -> Floats:
-    """(frames,) the identified values that are drawn."""
-    return curve.identified[curve.identified <= _drawn_end(curve)] if curve.logarithmic else curve.identified
+    axes.set(xlabel="time, h", ylabel=drawn[0].label)
 
 
 def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> None:
     """Axes from the measured and identified values of what is drawn of an output."""
-    values = np.concatenate([v for c in drawn for v in (c.measured, _drawn_values(c))])
+    values = np.concatenate([v for c in drawn for v in (c.measured, c.identified[c.identified <= _drawn_end(c)])])
     largest, logarithmic = float(np.nanmax(values, initial=0.0)), all(one.logarithmic for one in drawn)
     if logarithmic and largest > 0:
         shown = values[values >= SHOWN_STRAIN_RATIO * largest]
@@ -237,7 +234,8 @@ def set_curve_ranges(axes: Axes, drawn: Sequence[TestCurve], output: str) -> Non
     else:
         span(axes, "y", values, zero=True, most=8)
     hours = np.concatenate([c.hours for c in drawn])
-    set_time_range(axes, hours, logarithmic=logarithmic or output.startswith("stress"))
+    logarithmic |= output.startswith("stress")  # where creep spans decades of time: also stresses that relax
+    set_range(axes, "x", float(hours.min()) if logarithmic else 0.0, float(hours.max()), logarithmic=logarithmic)
 
 
 # ---- tests one by one ------------------------------------------------------------------------------------------------
@@ -264,7 +262,7 @@ def small_multiples(fit: Identification, tests: Sequence[int]) -> Figure:
         set_curve_ranges(above, [curve], output)
         _draw_residuals(below, fit, curve, output, (k, colours[k]))
         above.set_title(f"{shortened(fit.tests[k].name)}: {fit.histories[k].condition}", fontsize=8)
-        above.set_ylabel(axis_label(output), fontsize=8)
+        above.set_ylabel(curve.label, fontsize=8)
         above.tick_params(labelbottom=False, labelsize=7)
         below.tick_params(labelsize=7)
         below.set_xlabel("time, h" if place // columns == rows - 1 else "", fontsize=8)
@@ -312,7 +310,7 @@ def _draw_residuals(axes: Axes, fit: Identification, curve: TestCurve, output: s
     axes.axhline(0, color="black", lw=0.8)
     span(axes, "y", -limit, limit)
     axes.set_ylim(-limit, limit)
-    plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else unit_of(output)
+    plain = "100 ln ratio, ≈ %" if is_logarithmic(output) else shown_unit(output)[1]
     axes.set_ylabel("noise sd" if judged else plain, fontsize=7)
 
 
@@ -324,3 +322,184 @@ def residual_caption(fit: Identification) -> str:
         "measured less identified over the noise of the reading, the test's own rate, life and offset taken out; "
         "grey: two standard deviations"
     )
+
+
+# ---- fitted curves and their bands -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurves:
+    """What an identification predicts of its own tests, at their own nuisances and offsets, as it was compared.
+
+    Where the predictor was corrected by a more exact one, the prediction is the corrected one.
+
+    half_width : (tests, times, outputs) half width of the 95 % band from the covariance of the law's parameters and of
+        explicit nuisance parameters, in the output's unit. Noise, the scatter of rates between tests and the offsets'
+        uncertainty are not in it. growth : (tests, times, outputs) derivative to ln time; 0 of no strains.
+    """
+
+    prediction: Prediction
+    half_width: Floats
+    growth: Floats
+
+    def of(self, test: int, output: str) -> tuple[Floats, Floats, Floats]:
+        """Curve, half width of the band and growth, (times,) each, of an output of a test, in the output's unit."""
+        position, length = self.prediction.outputs.index(output), int(self.prediction.lengths[test])
+        band, growth = (of[test, :length, position] for of in (self.half_width, self.growth))
+        return self.prediction.of(test)[:, position], band, growth
+
+
+BEFORE = 1e-4
+"""Of a time: how much earlier a curve is predicted for its slope, which its frames do not show before a rupture."""
+
+
+@once
+def fitted_curves(fit: Identification) -> FittedCurves:
+    """The curves of the fitted tests with their bands: one prediction with sensitivities, made once."""
+    if fit.predictor is None or not fit.histories:
+        raise FitError(
+            "this identification was loaded without its histories: attach them with "
+            "fit.with_histories(histories, using)"
+        )
+    histories, coordinates = fit.histories, fit.coordinates
+    nuisances = fit.nuisance_values(histories)
+    prediction = fit.predictor.predict(
+        fit.law, coordinates.theta(fit.u)[None], histories, nuisances=nuisances, sensitivities=True
+    )
+    assert prediction.jacobian is not None
+    with np.errstate(invalid="ignore"):
+        jacobian = prediction.jacobian[0] @ coordinates.jacobian(fit.u)
+    jacobian = np.concatenate([jacobian, _nuisance_jacobian(fit, prediction)], axis=-1)
+    variance = np.einsum("...i,ij,...j->...", jacobian, joint_covariance(fit), jacobian)
+    growth = np.zeros_like(prediction.values[0])
+    if any(map(is_logarithmic, prediction.outputs)):
+        before = [replace(one, times=(1.0 - BEFORE) * one.times) for one in histories]
+        values = fit.predictor.predict(fit.law, coordinates.theta(fit.u)[None], before, nuisances=nuisances).values
+        growth = (prediction.values - values)[0] / BEFORE
+    if fit.numerical_error is not None:
+        prediction = with_correction_at_frames(fit.least_squares_problem, histories, prediction)
+    for k, test in enumerate(fit.tests):
+        for output_fit in test.outputs:
+            prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
+    return FittedCurves(prediction, NORMAL_QUANTILE * np.sqrt(np.maximum(variance, 0.0)), growth)
+
+
+def _nuisance_jacobian(fit: Identification, prediction: Prediction) -> Floats:
+    """(tests, times, outputs, nuisances) derivatives of the outputs to the nuisance parameters that were estimated."""
+    shape = prediction.values.shape[1:]
+    if not fit.nuisances:
+        return np.zeros((*shape, 0))
+    by_kind = {kind: values[0].reshape(shape[0], -1) for kind, values in prediction.nuisance_jacobian.items()}
+    jacobian = fit.least_squares_problem.nuisance_parameters.jacobian(by_kind)
+    return jacobian.reshape(*shape, len(fit.nuisances))
+
+
+def joint_covariance(fit: Identification) -> Floats:
+    """(unknowns, unknowns) covariance of x = (u, e): that of u as it was identified, and what e does given u.
+
+    A curve is known better than the law where a parameter and a nuisance parameter can only move it together. With
+    P = J'J the precision at the optimum, e given u has the mean -P_ee^-1 P_eu u and the covariance P_ee^-1.
+    """
+    count, size = fit.u.size, len(fit.nuisances)
+    if not size:
+        return fit.covariance
+    whitened = fit.least_squares_problem.jacobian(fit.x)
+    precision = whitened.T @ whitened
+    inverse = np.linalg.pinv(precision[count:, count:], hermitian=True)
+    gain = -inverse @ precision[count:, :count]
+    lift = np.concatenate([np.eye(count), gain])
+    covariance = lift @ fit.covariance @ lift.T
+    covariance[count:, count:] += inverse
+    return np.asarray(covariance)
+
+
+# ---- as they are drawn -----------------------------------------------------------------------------------------------
+
+
+WIDEST, WIDE_SHARE = 3.0, 0.1
+"""Factor to either side within which bands are drawn, and the share of a curve that may be beyond."""
+
+
+PLOTTED_STRAIN_RATIO = 0.02
+"""Differences of logarithms of strains are taken where a test's strain exceeds this share of its last one."""
+
+
+@dataclass(frozen=True, eq=False)
+class TestCurve:
+    """One output of one test, as it is drawn.
+
+    hours : (frames,) h.
+    measured, identified : (frames,) in the unit of the axis, offsets taken off where the axis is logarithmic.
+    half_width : (frames,) of the 95 % band, in the same unit; of the logarithm where the axis is logarithmic.
+        NaN where the law predicts nothing, as after a rupture. slope : (frames,) of the logarithm over that of time.
+    residuals : (frames,) measured less identified, in the unit of the axis, or 100 times the difference of their
+        logarithms where the axis is logarithmic; NaN where that would be noise alone.
+    label : of the axis.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    hours: Floats
+    measured: Floats
+    identified: Floats
+    half_width: Floats
+    slope: Floats
+    residuals: Floats
+    label: str
+    logarithmic: bool
+
+    def bands(self, end: float = np.inf) -> list[Floats]:
+        """Outlines (points, 2) of the 95 % band, hours and values, where the curve lies below `end`.
+
+        Logarithmic curves have it across themselves: of values where they are flat, of times where they are steep, as
+        before a rupture, whose time is what is uncertain. To first order both are the same: with s the slope of ln
+        value over ln time and h the half width, a point moves by h / (1 + s^2) up and by s h / (1 + s^2) back. A curve
+        of which more than WIDE_SHARE moves further than WIDEST has no band: first order says nothing of it.
+        """
+        known = np.isfinite(self.identified + self.half_width + self.slope) & (self.identified <= end)
+        up = self.half_width
+        upper, lower = (np.column_stack([self.hours, self.identified + side * up]) for side in (1.0, -1.0))
+        if self.logarithmic:
+            up = self.half_width / (1.0 + np.square(self.slope))
+            near = up * np.sqrt(1.0 + np.square(self.slope)) <= np.log(WIDEST)
+            known &= near & ((known & ~near).sum() <= WIDE_SHARE * known.sum())
+            up = np.where(known, up, 0.0)
+            upper, lower = (
+                np.column_stack([self.hours * np.exp(-side * self.slope * up), self.identified * np.exp(side * up)])
+                for side in (1.0, -1.0)
+            )
+        runs = np.split(np.arange(known.size), np.flatnonzero(np.diff(known)) + 1)
+        return [np.concatenate([upper[run], lower[run][::-1]]) for run in runs if known[run].all() and run.size > 1]
+
+
+def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: str) -> TestCurve:
+    """One output of one test of an identification, as it is drawn."""
+    history = fit.histories[test]
+    identified, half_width, growth = curves.of(test, output)
+    used = usable_frames(history, output)
+    hours, measured = history.times[used] / SECONDS_PER_HOUR, history.outputs[output][used]
+    identified, half_width, growth = identified[used], half_width[used], growth[used]
+    side, label = side_of(history), axis_label(output, history)
+    if not (is_logarithmic(output) and side):
+        factor = shown_unit(output)[0]
+        measured, identified, half_width, growth = factor * np.stack([measured, identified, half_width, growth])
+        return TestCurve(hours, measured, identified, half_width, growth, measured - identified, label, False)
+    offset, growth = fit.tests[test][output].offset, side * growth
+    measured, identified = 100 * side * (measured - offset), 100 * side * (identified - offset)
+    divisor = np.where(identified > 0, identified, np.nan)
+    last = measured[-1] if measured.size else 0.0
+    shown = np.where(measured > max(PLOTTED_STRAIN_RATIO * last, 0.0), measured, np.nan)
+    half_width, slope, residuals = 100 * half_width / divisor, 100 * growth / divisor, 100 * np.log(shown / divisor)
+    return TestCurve(hours, measured, divisor, half_width, slope, residuals, label, True)
+
+
+def side_of(history: History) -> int:
+    """1 of tests in tension, -1 of those in compression, 0 of both, whose strains have no logarithm to be drawn."""
+    loads = np.zeros(1) if history.loading.quantity == "components" else history.loading.program().values
+    return 1 if loads.min() >= 0.0 else -1 if loads.max() <= 0.0 else 0
+
+
+def axis_label(output: str, history: History) -> str:
+    """Name and unit of an output."""
+    side = "compressive " * (is_logarithmic(output) and side_of(history) < 0)
+    return side + ", ".join(filter(None, (output.replace("_", " "), shown_unit(output)[1])))

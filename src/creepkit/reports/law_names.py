@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -12,8 +11,7 @@ import sympy
 
 from creepkit.exporters.documents import equations_in_latex, expression_mathml
 from creepkit.exporters.law_description import comment_lines
-from creepkit.language import mean_stress, parameters, principal_stress, strain, stress, temperature, time
-from creepkit.language.printing import arrhenius_exponent
+from creepkit.language import mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.reports.answer import equations, symbols_of
 from creepkit.reports.blocks import Block, Formula, Paragraph, Rich, Table, Verbatim, number, printable, printable_lines
@@ -39,6 +37,10 @@ DEPENDENCE = re.compile(r" with [\w-]+ temperature dependence\b")
 """In the title of a law with temperature, which its equation shows."""
 
 
+FIXED = re.compile(r" with \w+=[\w.+-]+(, \w+=[\w.+-]+)*(?= \+ |$)")
+"""At the end of a term: what was fixed, which the name beside its equation says."""
+
+
 def title_in_sentence(law: CreepLaw) -> str:
     """The title of a law within a sentence: without abbreviations in brackets, and what follows a colon.
 
@@ -53,7 +55,7 @@ class LawNames:
     """Names of laws in a text, replaced by titles."""
 
     def __init__(self, fits: Iterable[Identification]) -> None:
-        titles = {fit.law.name: title_in_sentence(fit.law) for fit in fits}
+        titles = {fit.law.name: FIXED.sub("", title_in_sentence(fit.law)) for fit in fits}
         shared = Counter(titles.values())
         self.titles = {  # of two of one title the name says which is meant
             name: title if shared[title] == 1 else f"{title} ({name})"
@@ -134,17 +136,3 @@ def _variables(laws: Sequence[CreepLaw]) -> Table:
         gas = _symbol(sympy.Symbol("R"))
         rows.append((gas, f"gas constant, {GAS_CONSTANT:g}", "J/(mol K)"))
     return Table("Symbols that these equations share", ("symbol", "meaning", "unit"), rows)
-
-
-# ---- with values ----------------------------------------------------------------------------------------------------
-
-
-def law_expression(law: CreepLaw) -> sympy.Expr:
-    """The rate of a law with the symbols R and T_ref in its Arrhenius factors."""
-    (R, T_ref), rate = parameters("R T_ref"), law.rate
-    for exponential in rate.atoms(sympy.exp):
-        for part in sympy.Add.make_args(exponential.args[0]):
-            if found := arrhenius_exponent(part):
-                reference = 1 / T_ref if math.isfinite(found.T_ref) else 0
-                rate = rate.subs(part, -found.Q / R * (1 / temperature - reference))
-    return rate

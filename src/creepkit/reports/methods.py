@@ -12,9 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME
-from creepkit.inverse.observation_vector import FLOOR_NOISES, FLOOR_SHARE, MINIMUM_RATE_OUTPUT, RUPTURE_OUTPUT
+from creepkit.inverse.noise_model import MINIMUM_TESTS
+from creepkit.inverse.observation_vector import (
+    FLOOR_NOISES,
+    FLOOR_SHARE,
+    MINIMUM_RATE_OUTPUT,
+    RUPTURE_OUTPUT,
+    ObservationVector,
+)
 from creepkit.inverse.output_transforms import LogTransform
 from creepkit.inverse.variance_components import LARGEST_RATE_SCATTER, NOISE_PRIOR_SD
 from creepkit.inverse.working_noise import AUTOCORRELATION_CONFIDENCE
@@ -23,8 +31,9 @@ from creepkit.limits import SIGNIFICANCE
 from creepkit.records.loading import held_of
 from creepkit.reports.blocks import ends, listed, number, plural, printable, sentence, typeset
 from creepkit.reports.compared_values import compared_observations, reading_counts
-from creepkit.reports.identification import rate_scatter_sentence
 from creepkit.reports.law_names import title_in_sentence
+from creepkit.reports.wording import first_kind, say
+from creepkit.reports.words_of_methods import METHODS
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -52,7 +61,7 @@ CITATIONS = {
 
 
 class References:
-    """Citations of a text, numbered in the order in which they are made."""
+    """Citations of a text, numbered in the order in which they are made; a key of CITATIONS as an index cites it."""
 
     def __init__(self) -> None:
         self.texts: dict[str, int] = {}
@@ -63,82 +72,83 @@ class References:
         numbers = sorted({self.texts.setdefault(text, len(self.texts) + 1) for text in texts})
         return f" [{', '.join(map(str, numbers))}]" if numbers else ""
 
+    __getitem__ = cite
+
+    def said(self, kind: str, **values: Any) -> str:
+        """A sentence of METHODS."""
+        return sentence(say(METHODS[kind], cite=self, **values))
+
 
 def methods_text(contents: ReportContents) -> str:
     """Paragraphs on tests and laws, models, estimation, comparison and the other stages, then the references."""
     references = References()
-    cite = references.cite
-    source = f"The measured data are those of{cite(*contents.data_citations)}." if contents.data_citations else ""
     found = contents.identified
     fits = [one.fit for one in found]
-    paragraphs: list[Iterable[str]] = [[source]]
+    sources = references.cite(*contents.data_citations)
+    paragraphs: list[Iterable[str]] = [[references.said("source", sources=sources)] if sources else []]
     if found:
         paragraphs += [
-            [*_tests(fits), *_each(fits, _loading), *_laws(found, cite)],
-            _each(fits, _models),
-            [*_each(fits, lambda fit: _estimation(fit, cite)), *_each(found, _sparsity)],
-            [*_each(found, lambda one: _comparison(one, cite)), *_adequacy(fits, cite)],
+            [*_tests(fits, references), *_each(fits, references, _loading), *_laws(found, references)],
+            _each(fits, references, _models),
+            [*_each(fits, references, _estimation), *_each(found, references, _sparsity)],
+            [*_each(found, references, _comparison), *_adequacy(fits, references)],
         ]
-    paragraphs += [*_stages(contents, cite), _software(contents, cite)]
-    texts = [" ".join(filter(None, one)) for one in paragraphs]
+    paragraphs += [*([one] for one in _stages(contents, references)), _software(contents, references)]
+    texts = [" ".join(one) for one in paragraphs]
     numbered = "\n".join(f"[{k}] {text}" for text, k in references.texts.items())
     return f"{typeset(chr(10).join(f'{text}{chr(10)}' for text in texts if text))}\n{numbered}".strip() + "\n"
 
 
-def _each(found: Iterable[Any], sentences_of: Callable[[Any], Iterable[str]]) -> list[str]:
+def _each(
+    found: Iterable[Any], references: References, sentences_of: Callable[[Any, References], Iterable[str]]
+) -> list[str]:
     """The sentences on all materials, each once."""
-    return [*dict.fromkeys(text for one in found for text in sentences_of(one))]
+    return [*dict.fromkeys(text for one in found for text in sentences_of(one, references))]
 
 
 # ---- tests, laws and models ------------------------------------------------------------------------------------------
 
 
-def _tests(fits: Sequence[Identification]) -> Iterator[str]:
+def _tests(fits: Sequence[Identification], references: References) -> Iterator[str]:
     """How many tests and readings there are, and in what quantity these are compared."""
     counts = [reading_counts(fit.histories, fit.settings.frames) for fit in fits]
-    measured, fitted = (sum(values) for values in zip(*((c.measured, c.fitted) for c in counts), strict=True))
-    materials = f" of {plural(len(fits), 'material')}" if len(fits) > 1 else ""
-    readings = f": {fitted} of {plural(measured, 'reading')} were fitted" if measured else ""
-    yield f"Creep laws were identified from {plural(sum(len(one.tests) for one in fits), 'test')}{materials}{readings}."
-    compared = _each(fits, _transforms)
-    if compared:
-        yield f"Compared were {listed(compared)}."
-    if any("arsinh" in text for text in compared):
-        yield f"The floor f is {100 * FLOOR_SHARE:g} % of the median end value, at least {FLOOR_NOISES:g} noises."
-    if any(one is not None and one.followed_to_rupture.any() for one in map(compared_observations, fits)):
-        yield "Readings to rupture, or of a rising rate, have orthogonal residuals √2 |a b| / √(a² + b²), signed as a."
-        yield "There a is predicted less measured transformed strain, b ln of the measured over the predicted time."
-        yield "Tests stopped before rupture count only where they lasted longer than predicted."
+    readings, fitted = plural(sum(one.measured for one in counts), "reading"), sum(one.fitted for one in counts)
+    materials = plural(len(fits), "material") if len(fits) > 1 else ""
+    tests = plural(sum(len(one.tests) for one in fits), "test")
+    yield references.said("tests", tests=tests, materials=materials, fitted=fitted, readings=readings)
+    observations = [one for one in map(compared_observations, fits) if one is not None]
+    outputs = dict.fromkeys(text for one in observations for text in _transforms(one))
+    if outputs:
+        yield references.said("compared", outputs=listed([*outputs]))
+    if any(isinstance(transform, LogTransform) for one in observations for transform in one.transforms):
+        yield references.said("floor", share=FLOOR_SHARE, noises=FLOOR_NOISES)
+    if any(one.followed_to_rupture.any() for one in observations):
+        yield references.said("to rupture")
 
 
-def _transforms(fit: Identification) -> Iterator[str]:
-    observations, linear = compared_observations(fit), list[str]()
-    for output, transform in (
-        () if observations is None else zip(observations.outputs, observations.transforms, strict=True)
-    ):
-        name = output.replace("_", " ")
-        if output in (RUPTURE_OUTPUT, MINIMUM_RATE_OUTPUT):
-            yield f"{'rupture times' if output == RUPTURE_OUTPUT else 'minimum creep rates'} by their logarithms"
-        elif isinstance(transform, LogTransform):
-            yield f"{name} ε as arsinh(ε / 2f), a logarithm above f"
+def _transforms(observations: ObservationVector) -> Iterator[str]:
+    single, linear = {RUPTURE_OUTPUT: "of ruptures", MINIMUM_RATE_OUTPUT: "of rates"}, list[str]()
+    for output, transform in zip(observations.outputs, observations.transforms, strict=True):
+        logarithmic, name = isinstance(transform, LogTransform), output.replace("_", " ")
+        if output in single or logarithmic:
+            yield say(METHODS[single.get(output, "of logarithms")], output=name)
         else:
             linear.append(name)
     if linear:
-        yield f"{listed(linear)} over the standard deviation of a reading"
+        yield say(METHODS["of readings"], outputs=listed(linear))
 
 
-def _loading(fit: Identification) -> Iterator[str]:
+def _loading(fit: Identification, references: References) -> Iterator[str]:
     """What was held in uniaxial tests, what their strains are, and the elastic data that were used."""
     controls = {held_of(h.loading) for h in fit.histories if h.loading.quantity == "stress"}
-    held = {"load": "Loads were held, so that the true stress grows with strain.", "stress": "True stresses were held."}
-    yield from (text for control, text in held.items() if control in controls)
+    yield from map(references.said, (one for one in ("load", "stress") if one in controls))
     strains = {(h.strain_measure, h.includes_elastic) for h in fit.histories if "strain" in h.outputs}
     for measure, elastic in sorted(strains):
-        yield f"Strains are {measure} and {'contain' if elastic else 'do not contain'} the elastic strain on loading."
+        yield references.said("with elastic" if elastic else "without elastic", measure=measure)
     known = [h.elastic.at(h.mean_temperature) for h in fit.histories if h.elastic is not None]
     if known:
         moduli, ratios = ends([1e-3 * float(one.E) for one in known]), ends([float(one.nu) for one in known])
-        yield f"Young's modulus is {moduli} GPa and Poisson's ratio {ratios} in {plural(len(known), 'test')}."
+        yield references.said("elastic", moduli=moduli, ratios=ratios, tests=plural(len(known), "test"))
 
 
 def laws_of(found: Sequence[ReportGroup]) -> dict[str, CreepLaw]:
@@ -146,28 +156,28 @@ def laws_of(found: Sequence[ReportGroup]) -> dict[str, CreepLaw]:
     return {one.law.name: one.law for group in found for one in group.fits}
 
 
-def _laws(found: Sequence[ReportGroup], cite: Callable[..., str]) -> Iterator[str]:
+def _laws(found: Sequence[ReportGroup], references: References) -> Iterator[str]:
     """The laws by their titles and the numbers of their equations, with what they cite, and their T_ref."""
-    named = [
-        f"the {title_in_sentence(law)}, Eq. ({k}){cite(*law.references)}"
-        for k, law in enumerate(laws_of(found).values(), start=1)
-    ]
-    yield f"The law was {named[0]}." if len(named) == 1 else f"The laws tried were {'; '.join(named)}."
+    laws = laws_of(found)
+    if len(laws) > 1:
+        yield references.said("laws", count=len(laws))
+    for k, law in enumerate(laws.values(), start=1):
+        sources, kind = references.cite(*law.references), "of laws" if len(laws) > 1 else "law"
+        yield references.said(kind, title=title_in_sentence(law), number=k, sources=sources)
     rates = [
         rate for one in found for rate in (*one.fit.law.terms.values(), *(s.rate for s in one.fit.law.states.values()))
     ]
     exponents = (part for rate in rates for e in rate.atoms(sympy.exp) for part in sympy.Add.make_args(e.args[0]))
     factors = {one.T_ref for one in map(arrhenius_exponent, exponents) if one is not None} - {math.inf}
     if factors:
-        shown = listed([f"{number(T, 6)} K" for T in sorted(factors)])
-        yield f"Rate coefficients of laws with an activation energy are those at T_ref = {shown}."
+        yield references.said("T_ref", temperatures=listed([f"{number(T, 6)} K" for T in sorted(factors)]))
 
 
-def _models(fit: Identification) -> Iterator[str]:
+def _models(fit: Identification, references: References) -> Iterator[str]:
     """By what the tests were predicted: the specimen's own words on it, the surrogate, and the reduced-order model."""
     predictor, name = fit.predictor, printable(str(fit.provenance.get("specimen", "")), 80)
     surrogate = predictor is not None and predictor.specimen is not predictor and not predictor.parts
-    yield f"The tests were predicted by {'a surrogate' if surrogate else 'the model'} of the specimen '{name}'."
+    yield references.said("surrogate" if surrogate else "model", name=name)
     if predictor is None:
         return
     tests: dict[str, list[History]] = {}
@@ -178,122 +188,99 @@ def _models(fit: Identification) -> Iterator[str]:
         tests.setdefault(own.label, []).append(history)
     yield from (sentence(text) for label, piece in pieces.items() if (text := piece.model_text(tests[label])))
     if predictor.reduced_order_model() is not None:
-        yield "The global search used the reduced-order model of these finite elements."
+        yield references.said("reduced order")
 
 
 # ---- estimation ------------------------------------------------------------------------------------------------------
 
 
-def _estimation(fit: Identification, cite: Callable[..., str]) -> Iterator[str]:
+def _estimation(fit: Identification, references: References) -> Iterator[str]:
     """How the optimum was sought, what was weighted how, and what intervals are made of."""
-    settings, noise = fit.settings, fit.noise_model
-    region = f"by least squares in a trust region{cite('trust region')}"
-    yield f"Parameters were sought within the bounds of the table of symbols {region}."
-    if "search_ends" in fit.provenance:
-        points = f"at most {settings.sobol_points} points of a Sobol' sequence{cite('sobol')}"
-        yield f"Up to {plural(settings.starts, 'start')} were picked out of {points} (seed {settings.seed})."
-    if settings.weights == "equal":
-        yield "Values were found by least squares of readings of equal weight."
-    components = "White and autocorrelated noise, offsets and the scatter of rates"
-    yield f"{components} were estimated by restricted maximum likelihood{cite('reml')}."
-    freedom = f"Satterthwaite's degrees of freedom{cite('satterthwaite')}"
-    if settings.weights == "likelihood":
-        yield f"95 % intervals follow from the whole covariance with {freedom}."
-        yield "Parameters have weak Gaussian priors, with the variance of a uniform distribution between their bounds."
-    else:
-        weighted = f"this weighted estimate{cite('weighted least squares')}, H⁻¹ (Jᵀ W C W J + P) H⁻¹"
-        yield f"95 % intervals follow from the covariance of {weighted}. There H = Jᵀ W J + P, with {freedom}."
-        yield "J are derivatives of residuals, W weights, C the covariance of the noise, P the precision of the priors."
-    if nuisances := list(dict.fromkeys(one.kind for one in settings.nuisances)):
-        yield f"Nuisance parameters of the tests with Gaussian priors are {listed(nuisances)}."
-    yield rate_scatter_sentence(fit)
-    chance = f"{100 * AUTOCORRELATION_CONFIDENCE:g} % of cases"
-    yield "Autocorrelated parts have the covariance s² exp(-d / l), d in ln t of logarithms, else in relative time."
-    yield f"Those were kept by which the likelihood gains more than by chance in {chance}."
-    if any(one.stated > 0 for one in noise.outputs.values()):
-        yield (
-            "The noise of a reading has a log-normal prior about the noise that its test states, with a standard "
-            f"deviation of {number(NOISE_PRIOR_SD, 2)} of its logarithm."
-        )
-    if fit.numerical_error is not None:
-        yield "Numerical errors of predictions were corrected at the optimum; a tenth of them stays in the covariance."
+    settings, kinds = fit.settings, list(dict.fromkeys(one.kind for one in fit.settings.nuisances))
+    holds = {
+        "region": True,
+        "starts": "search_ends" in fit.provenance,
+        "equal weights": settings.weights == "equal",
+        "noise": True,
+        "likelihood": settings.weights == "likelihood",
+        "weighted": settings.weights != "likelihood",
+        "nuisances": kinds,
+        "": True,  # on the scatter of rates
+        "autocorrelated": True,
+        "stated noise": any(one.stated > 0 for one in fit.noise_model.outputs.values()),
+        "numerical error": fit.numerical_error,
+    }
+    values = {"starts": plural(settings.starts, "start"), "points": settings.sobol_points, "seed": settings.seed}
+    values |= {"kinds": listed(kinds), "chance": AUTOCORRELATION_CONFIDENCE, "sd": NOISE_PRIOR_SD}
+    for kind in (kind for kind, true in holds.items() if true):
+        yield references.said(kind, **values) if kind else rate_scatter_sentence(fit)
 
 
-def _sparsity(found: ReportGroup) -> Iterator[str]:
+def rate_scatter_sentence(fit: Identification) -> str:
+    """How much the creep rates of single tests scatter, and whether that was estimated, given, assumed or left out."""
+    rates = [n for n in fit.settings.nuisances if n.kind == "rate" and not n.is_simulated]
+    kinds = {
+        "no scatter": not rates,
+        "given scatter": any(one.sd is not None for one in rates[:1]),
+        "unknown scatter": len(fit.tests) < MINIMUM_TESTS,
+        "undetected scatter": fit.noise_model.rate <= UNDETECTED_SCATTER,
+        "scatter": True,
+    }
+    values = {"scatter": 100 * fit.noise_model.rate, "tests": plural(len(fit.tests), "test")}
+    return References().said(first_kind(kinds), **values)
+
+
+def _sparsity(found: ReportGroup, references: References) -> Iterator[str]:
     """How terms of a sum were selected, where they were."""
     for sparse in [one.sparsity for one in found.fits if one.sparsity is not None][:1]:
-        dropped = f"left out were {listed([*sparse.dropped_terms])}" if sparse.dropped_terms else "all terms stayed"
-        selected = "were selected by the evidence for its subsets"
-        yield f"The terms of the sum {printable(sparse.law, 120)} {selected}; {dropped}."
+        dropped = say(METHODS["dropped" if sparse.dropped_terms else "all kept"], names=listed([*sparse.dropped_terms]))
+        yield references.said("terms", law=printable(sparse.law, 120), dropped=dropped)
 
 
 # ---- comparison and adequacy -----------------------------------------------------------------------------------------
 
 
-def _comparison(found: ReportGroup, cite: Callable[..., str]) -> Iterator[str]:
+def _comparison(found: ReportGroup, references: References) -> Iterator[str]:
     """How the laws of a material were compared."""
-    if found.ranking is None:
-        return
-    yield f"The laws were compared by their evidence, by Laplace's method{cite('evidence')}."
-    yield "Chi-square is that under the covariance of the best law, with nuisance parameters integrated out."
-    yield "Each parameter costs 2 ln of the factor by which the tests narrow its bounds."
-    yield f"The weight of a law is exp(-difference / 2) over the sum of all; it is credible above {CREDIBLE_WEIGHT:g}."
-    yield f"It is decisive above {DECISIVE_WEIGHT:g} if it was asked for and the tests do not reject it."
-    yield "Nor may a share of another law, or an effect that was not modelled, change that."
+    if found.ranking is not None:
+        yield references.said("comparison", credible=CREDIBLE_WEIGHT, decisive=DECISIVE_WEIGHT)
 
 
-def _adequacy(fits: Sequence[Identification], cite: Callable[..., str]) -> Iterator[str]:
+def _adequacy(fits: Sequence[Identification], references: References) -> Iterator[str]:
     """How it was judged whether the tests reject a law; none where it was not."""
-    judged = [fit.adequacy for fit in fits if fit.adequacy is not None]
-    if not judged:
-        return
-    noise = "noise that was stated or estimated without it"
-    yield f"Tests reject a law whose chi-square against {noise} has a probability below {100 * SIGNIFICANCE:g} %."
-    if any(len(one.outputs) > 1 for one in judged):
-        yield "It is the least of those of all outputs and of each one, times their number."
-    largest = number(math.exp(LARGEST_RATE_SCATTER), 2)
-    yield f"They reject it, too, where rates of tests scatter by more than a factor of {largest}."
-    yield "So do they where a changing exponent or energy, one test, or two groups explain scatter six times better."
-    if any(output.noise_source == "estimated" for one in judged for output in one.outputs):
-        freedom = f"{FREEDOM_PER_FRAME:g} degrees of freedom each"
-        yield f"Noise that no test states is estimated from third differences of neighbouring readings, with {freedom}."
-        distribution = f"an F distribution, or one of the mean and variance of several{cite('satterthwaite')}"
-        yield f"Chi-square over its degrees of freedom then has {distribution}."
+    judged = [fit.adequacy.outputs for fit in fits if fit.adequacy is not None]
+    holds = {
+        "rejection": bool(judged),
+        "several outputs": any(len(one) > 1 for one in judged),
+        "rates": bool(judged),
+        "estimated noise": any(output.noise_source == "estimated" for one in judged for output in one),
+    }
+    values = {"significance": SIGNIFICANCE, "factor": math.exp(LARGEST_RATE_SCATTER), "freedom": FREEDOM_PER_FRAME}
+    yield from (references.said(kind, **values) for kind, true in holds.items() if true)
 
 
 # ---- other stages ----------------------------------------------------------------------------------------------------
 
 
-def _stages(contents: ReportContents, cite: Callable[..., str]) -> Iterator[list[str]]:
+def _stages(contents: ReportContents, references: References) -> Iterator[str]:
     """A paragraph on each of the other stages."""
     if contents.exclusions:
-        tests = {one.test for one in contents.exclusions}
-        yield [
-            f"Readings of {plural(len(tests), 'test')}, or whole tests, were left out for the reasons in the report."
-        ]
+        yield references.said("left out", tests=plural(len({one.test for one in contents.exclusions}), "test"))
     if contents.temperature:
-        how = "by regression on isothermal estimates with their covariances"
-        yield [f"Forms of temperature of the parameters were chosen {how}, over all combinations of forms."]
+        yield references.said("temperature")
     for assessment in contents.rupture.values():
         methods = dict.fromkeys(one.fit.method for one in assessment.ranked)
-        cited = [f"{name}{cite(name) if name in CITATIONS else ''}" for name in methods]
-        yield [
-            f"{plural(len(assessment.tests), 'rupture test')}, run-outs as censored times and heats and laboratories "
-            f"as random effects, were assessed by {listed(cited)}."
-        ]
+        cited = listed([f"{name}{references.cite(*{name} & {*CITATIONS})}" for name in methods])
+        yield references.said("rupture", tests=plural(len(assessment.tests), "rupture test"), methods=cited)
     for forecast in [*contents.forecasts.values()][:1]:
-        yield [
-            f"Bands of {100 * forecast.level:g} % contain the uncertainty of parameters and of the choice of the law.",
-            "They contain the scatter between tests, dimensions, noise and numerical error as well.",
-            f"They come from {forecast.draws} draws in each test." * bool(forecast.draws),
-        ]
+        yield references.said("forecast", level=100 * forecast.level, draws=forecast.draws)
     for design in [*contents.design.values()][:1]:
-        yield [f"Expected information of further tests about the {design.goal} was computed{cite('lindley')}."]
+        yield references.said("design", goal=design.goal)
 
 
-def _software(contents: ReportContents, cite: Callable[..., str]) -> list[str]:
+def _software(contents: ReportContents, references: References) -> list[str]:
     """By which version; those of all packages stand where the page says how to repeat the work."""
     found = [str(one.fit.provenance.get("creepkit", "")) for one in contents.identified]
     known = printable(contents.provenance.versions.get("creepkit") or [*found, ""][0], 60)
     seed = "" if contents.provenance.seed is None else f", seed {contents.provenance.seed}"
-    return [f"The work was done with creepkit {known}{cite('creepkit')}{seed}."] if known else []
+    return [references.said("software", version=known, seed=seed)] if known else []

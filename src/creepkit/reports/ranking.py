@@ -1,4 +1,4 @@
-"""What a ranking of laws says: the laws with misfits and weights, and what else the tests allow."""
+"""What a ranking or a search of laws says: the laws with misfits and weights, and what else the tests allow."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from creepkit.reports.compared_values import judged_readings, misfit_of
 from creepkit.reports.condition_colours import distinct_colours, temperatures_celsius
 from creepkit.reports.description import Description, spread_text
 from creepkit.reports.figures import empty_figure, logarithmic_labels, panel_grid, power_of_ten, shortened, wrapped
-from creepkit.reports.identification_plot import draw_curve, set_curve_ranges
-from creepkit.reports.load_programs import program_text
-from creepkit.reports.prediction_bands import FittedCurves, axis_label, curve_of_test, fitted_curves
-from creepkit.reports.remarks import challenge_text
+from creepkit.reports.histories import program_text
+from creepkit.reports.identification_plot import (
+    FittedCurves,
+    curve_of_test,
+    draw_curve,
+    fitted_curves,
+    set_curve_ranges,
+)
 from creepkit.reports.terminal import print_table, tell, tell_written
-from creepkit.reports.verdicts import scatter_text, verdict_text
+from creepkit.reports.verdicts import challenge_text, scatter_text, verdict_text
 from creepkit.reports.words import COMPARED
 
 if TYPE_CHECKING:
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection.ranking import RankedLaw, Ranking
+    from creepkit.law_search.results import LawSearch
     from creepkit.reports.svg import PageFigures
 
 
@@ -55,7 +60,7 @@ def ranking_blocks(ranking: Ranking, figures: PageFigures | None = None, of: str
         blocks.append(Paragraph(COMPARED["chi-square"], "note"))
     blocks.append(Items([*map(challenge_text, ranking.challenges or ())], "what the tests allow beside the best law:"))
     blocks.append(Items([f"{name}: {reason}" for name, reason in ranking.failed.items()]))
-    if figures is not None and ranking.best.tests:
+    if figures is not None and np.isfinite(misfits(ranking)).any():
         weights = ", ".join(f"{r.fit.law.name} {r.weight:.3f}" for r in ranking.laws)
         description = (
             f"{misfit_name(ranking)}: {plural(len(ranking.laws), 'law')} in {plural(len(ranking.best.tests), 'test')}, "
@@ -265,5 +270,53 @@ def _draw_test(axes: Axes, laws: Sequence[RankedLaw], curves: Sequence[FittedCur
     for k, (curve, colour) in enumerate(zip(drawn, distinct_colours(len(laws)), strict=True)):
         draw_curve(axes, curve, colour, "-" if k == 0 else "--", dots="0.35" if k == 0 else None)
     set_curve_ranges(axes, drawn, output)
-    axes.set(xlabel="time, h", ylabel=axis_label(output))
+    axes.set(xlabel="time, h", ylabel=drawn[0].label)
     axes.set_title(wrapped(f"{shortened(history.name, 48)}: {shortened(program_text(history), 96)}", 3.0), fontsize=8.5)
+
+
+# ---- search of laws --------------------------------------------------------------------------------------------------
+
+
+def law_search_text(search: LawSearch) -> str:
+    """The answer of the best law, the front with the registered laws, and what the budget left out."""
+    front = search.front
+    laws = {one.law.name: one for one in [*(one for one in search.tried if one.registered), *front]}
+    rows = [
+        (
+            f"{one.law.name}{' (registered)' if one.registered else ''}",
+            *(str(one.parameters), str(one.complexity), f"{one.misfit:.3f}", number(one.excess, 3)),
+            "yes" if one in front else "",
+        )
+        for one in sorted(laws.values(), key=lambda law: (law.complexity, law.misfit))
+    ]
+    columns = ("law", "parameters", "complexity", "rms ln strain", "behind", "on the front")
+    table = Table("no simpler law than one on the front has a smaller misfit", columns, rows)
+    answer = answer_text(search.best, search.ranking, searched=[one.law.name for one in search.tried])
+    return f"{answer}\n\n{as_text([table, Paragraph(effort_text(search))])}"
+
+
+def effort_text(search: LawSearch) -> str:
+    """How many sentences were tried in which time, and what was left out."""
+    tried = f"{plural(len(search.tried), 'law')} identified in {search.seconds:.0f} s of CPU time"
+    if not search.untried:
+        return f"{tried}; no change of one factor improves the best"
+    return f"{tried}; the budget of {search.budget:g} s left changes of {plural(search.untried, 'sentence')} untried"
+
+
+def front_figure(search: LawSearch) -> Figure:
+    """The front as a picture of its own."""
+    figure = empty_figure(7.5, 5.0)
+    draw_front(figure.subplots(), search)
+    return figure
+
+
+def draw_front(axes: Axes, search: LawSearch) -> None:
+    """Misfit against complexity: all laws that were tried, the front, and names of the ranked ones."""
+    front = search.front
+    axes.plot([one.complexity for one in search.tried], [one.misfit for one in search.tried], "o", ms=3, color="0.7")
+    axes.step([one.complexity for one in front], [one.misfit for one in front], where="post", color="C0")
+    named = dict.fromkeys([*front, *(one for one in search.tried if one.registered)])
+    for one in named:
+        axes.plot(one.complexity, one.misfit, "s" if one.registered else "o", color="C1" if one.registered else "C0")
+        axes.annotate(one.law.name, (one.complexity, one.misfit), fontsize=7, xytext=(3, 3), textcoords="offset points")
+    axes.set(xlabel="complexity: parameters and operations", ylabel="rms of ln strain", yscale="log")

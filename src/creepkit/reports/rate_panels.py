@@ -15,6 +15,7 @@ from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.language import strain, time
 from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS
 from creepkit.records.held_levels import held_temperatures
+from creepkit.records.units import time_text
 from creepkit.reports.condition_colours import distinct_colours, temperature_scale, tested_temperatures
 from creepkit.reports.description import rejected
 from creepkit.reports.figures import draw_parity, panels_of, place_legend, shortened, span
@@ -97,13 +98,11 @@ def _draw_reference_rates(axes: Axes, fit: Identification) -> None:
     points = [RatePoints("each test: the law at its own rate", *np.array(own).T)] if own else []
     _draw(axes, fit, curves, points, "95 % band: law")
     reference = fit.reference
-    initial = reference.conditions_text(fit.law).replace(", ", "\n", 1)
-    initial += "\nwith internal variables as at the start" if fit.law.states else ""
+    at = [f"{100 * reference.strain:.2g} % strain"] * fit.law.uses(strain)
+    at += [time_text(reference.time)] * fit.law.uses(time) + ["initial internal variables"] * bool(fit.law.states)
+    conditions = reference.conditions_text(fit.law).replace(", ", "\n", 1)
     axes.set(xlabel="von Mises stress, MPa", ylabel="creep rate, %/h")
-    axes.set_title(
-        f"the law's rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h{initial}",
-        fontsize=9,
-    )
+    axes.set_title(f"the law's rate{' at ' * bool(at)}{' and '.join(at)}{conditions}", fontsize=9)
 
 
 def _stresses_at(fit: Identification, T: float) -> tuple[float, float]:
@@ -213,7 +212,7 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
             ends = [[max(predicted - low, 0.0)], [max(high - predicted, 0.0)]]
             axes.errorbar(measured, predicted, yerr=ends, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     if any(r.censored for r, _ in ruptures):
-        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped: broke later, if at all")
+        axes.plot([], [], ">", ms=4.5, mfc="white", color="grey", label="stopped before rupture")
     axes.set(xlabel="measured time to rupture, h", ylabel="predicted time to rupture, h")
     place_legend(axes, below=True)
     axes.set_title("bars: 95 % of a single test, if the law is right", fontsize=9)
@@ -265,7 +264,7 @@ MOST_LAWS = 10
 """Laws with a colour of their own."""
 
 
-WIDTH, PAGE_WIDTH, ROW, LARGEST = 8.6, 5.8, 0.115, 11.0
+WIDTH, PAGE_WIDTH, ROW, LARGEST = 8.6, 4.8, 0.115, 11.0
 """Inches of the figure, of one on a page for telephones too, of a material in it, and of its height at most."""
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -18,7 +18,7 @@ from creepkit.experiments.planned_design import Design
 from creepkit.exporters.exporting import export
 from creepkit.extraction.extraction import Extraction
 from creepkit.files.json_documents import json_text
-from creepkit.files.reading import FileKind, read_bytes
+from creepkit.files.reading import FileKind, sha256_of
 from creepkit.files.writing import check_target, write_text
 from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
@@ -34,10 +34,10 @@ from creepkit.reports.contents import (
     ReportGroup,
     ReportProvenance,
     ReportSource,
+    identified_files,
     versions_of,
 )
 from creepkit.reports.html import report_html
-from creepkit.reports.identified_files import identified_files
 from creepkit.rupture_assessment.assessment import RuptureAssessment
 from creepkit.screening.results import AlloyResult, ScreeningResult
 
@@ -184,7 +184,6 @@ def _title(groups: Sequence[ReportGroup]) -> str:
 
 
 def _quality(histories: Sequence[History]) -> Any:
-
     try:
         return check_data_quality(histories) if histories else None
     except CreepkitError:  # of tests that only a fit can take, such as plans
@@ -249,8 +248,5 @@ def _inputs(histories: Sequence[History]) -> Iterator[tuple[str, str]]:
     """(file, sha256) of the files of histories that are still there."""
     kind = FileKind("a test", ReportError, "write the test to several files", maximum_bytes=500_000_000)
     for source in dict.fromkeys(h.source for h in histories if h.source):
-        path = Path(source)
-        try:
-            yield path.name, hashlib.sha256(read_bytes(path, kind)).hexdigest()
-        except ReportError:
-            continue
+        with suppress(ReportError):
+            yield Path(source).name, sha256_of(Path(source), kind)

@@ -11,9 +11,9 @@ from creepkit.arrays import Floats
 from creepkit.inverse.evidence import CREDIBLE_WEIGHT
 from creepkit.records.units import ZERO_CELSIUS, celsius_text
 from creepkit.reports.answer import interval_text, known_bounds, rupture_figures
-from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, as_text, ends, listed, plural, plural_of
+from creepkit.reports.blocks import Answer, Block, Items, Paragraph, Table, ends, listed, plural, plural_of
 from creepkit.reports.condition_colours import ColourScale
-from creepkit.reports.figures import draw_parity, empty_figure, span, wrapped
+from creepkit.reports.figures import draw_parity, empty_figure, panels_of, place_legend, span, wrapped
 from creepkit.reports.words import RUPTURE
 from creepkit.rupture_assessment.checks import BAND_FACTOR
 from creepkit.rupture_assessment.fitting import conditions_of
@@ -44,9 +44,9 @@ SHOWN_EFFECTS = 6
 PASSED = {True: "passes", False: "FAILS", None: "cannot be made"}
 
 
-def rupture_details(assessment: RuptureAssessment) -> str:
+def assessment_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
     """The verdict, then methods, strengths and checks, and the notes."""
-    return as_text([*strength_blocks(assessment), *rupture_blocks(assessment)])
+    return [*strength_blocks(assessment), *rupture_blocks(assessment, figures, of)]
 
 
 def rupture_verdict(assessment: RuptureAssessment) -> str:
@@ -63,7 +63,7 @@ def _fails(assessment: RuptureAssessment) -> list[str]:
     return [RUPTURE["fails"].format(best=assessment.best.method, check=check) for check in failed]
 
 
-def rupture_answer(assessment: RuptureAssessment) -> Answer:
+def rupture_answer(assessment: RuptureAssessment, picture: Block | None = None) -> Answer:
     """It in few lines."""
     longest, warned = 10 ** float(assessment.tests.log_time.max()), _fails(assessment)
     stated = [one for one in assessment.strengths if one.method == "average" and one.value is not None]
@@ -71,9 +71,9 @@ def rupture_answer(assessment: RuptureAssessment) -> Answer:
     beyond = far > LONGEST_EXTRAPOLATION * longest
     following = "longer" if beyond else "check" if warned else "strengths"
     said = RUPTURE["extrapolated"].format(hours=f"{far:g}", longest=f"{longest:.4g}")
-    lives = rupture_figures(assessment)[: len(assessment.lives)]
-    figures = [(one.name, one.where, one.text, one.remark) for one in lives]
-    for T in dict.fromkeys(one.temperature for one in stated):
+    shown = rupture_figures(assessment)[: len(assessment.lives) if picture is None else None]
+    figures = [(one.name, one.where, one.text, one.remark) for one in shown]
+    for T in dict.fromkeys(one.temperature for one in stated) if picture is None else ():  # of which a page has tables
         alike = [one for one in stated if one.temperature == T]
         texts = [interval_text((one.value or 0.0, *known_bounds(one))) for one in alike]
         hours = ", ".join(f"{one.hours:g}" for one in alike)
@@ -84,12 +84,16 @@ def rupture_answer(assessment: RuptureAssessment) -> Answer:
         figures=figures,
         cautions=[*warned, *[said] * beyond],
         next_step=RUPTURE[following].format(hours=f"{float(f'{far / LONGEST_EXTRAPOLATION:.2g}'):g}"),
+        picture=picture,
         more=".details(), or creepkit rupture --json",
     )
 
 
-def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
-    """The tests, the verdict, times to rupture, and the strengths of the average method and by minimum rates."""
+def strength_blocks(assessment: RuptureAssessment, figures: PageFigures | None = None, of: str = "") -> list[Block]:
+    """The tests, the verdict, times to rupture, and the strengths of the average method and by minimum rates.
+
+    figures : of a page, where the answer with the isotherms stands in the place of the verdict.
+    """
     relation, groups = assessment.relation, assessment.tests.groups
     scattering = [group for group in groups if _largest_scatter(assessment, group) >= LEAST_SCATTER_SHOWN]
     note = "no bounds of a new heat: the tests tell no heats or laboratories apart"
@@ -101,8 +105,12 @@ def strength_blocks(assessment: RuptureAssessment) -> list[Block]:
         by = "" if method == "average" else f" by {method}"
         shown = [one for one in assessment.strengths if one.method == method]
         tables.append(_bounds(f"creep rupture strengths in MPa{by}", shown, of_heat, level))
-    head = Paragraph(_tests_text(assessment))
-    return [Paragraph(assessment.verdict, "lead"), head, *tables, *([] if scattering else [Paragraph(note, "note")])]
+    head: list[Block] = [Paragraph(assessment.verdict, "lead"), Paragraph(_tests_text(assessment))]
+    if figures is not None:
+        caption = "Isotherms with tests, run-outs and bounds; grey: beyond three times the longest test."
+        drawn = figures.picture(lambda: isotherms_figure(assessment), f"Rupture strength{of}", caption, caption)
+        head = [rupture_answer(assessment, drawn)]
+    return [*head, *tables, *([] if scattering else [Paragraph(note, "note")])]
 
 
 def _bounds(caption: str, found: Sequence[Any], of_heat: str, level: float) -> Table:
@@ -214,6 +222,9 @@ RUN_OUT = "$\\rightarrow$"
 """Marker of tests that did not break."""
 
 POINTS = 181
+ISOTHERMS_WIDTH, ISOTHERMS_HEIGHT = 4.6, 4.0
+"""Inches of the isotherms alone."""
+
 LONGEST_HOURS = 1e5
 """Up to which isotherms are drawn at least."""
 
@@ -233,6 +244,14 @@ def rupture_figure(assessment: RuptureAssessment) -> Figure:
     handles, labels = isotherms.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), fontsize=8)
     figure.suptitle(wrapped(assessment.verdict, 12.5), fontsize=10)
+    return figure
+
+
+def isotherms_figure(assessment: RuptureAssessment) -> Figure:
+    """The isotherms alone."""
+    figure, axes = panels_of(ISOTHERMS_WIDTH, ISOTHERMS_HEIGHT)
+    draw_isotherms(axes, assessment)
+    place_legend(axes, below=True)
     return figure
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE, delta_method
-from creepkit.records.units import ZERO_CELSIUS, celsius_text
-from creepkit.reports.answer import equations, value_cells
-from creepkit.reports.blocks import Block, Formula, Items, Paragraph, Table, Verbatim, as_text
+from creepkit.records.units import ZERO_CELSIUS, celsius_text, time_text
+from creepkit.reports.answer import equations, symbols_of, value_cells
+from creepkit.reports.blocks import Block, Cell, Formula, Items, Paragraph, Table, Verbatim, as_text
 from creepkit.reports.description import rejected
 from creepkit.reports.figures import panel_grid, place_legend, span
 
@@ -105,7 +105,7 @@ def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:
 def _panel_title(temperature_law: TemperatureLaw, coordinates: Coordinates, k: int, name: str) -> str:
     param, reference = temperature_law.isothermal_law.table[name], temperature_law.isothermal_estimates.reference
     if k in coordinates.coefficients:
-        return f"log10 of the rate of {name} (1/s) at {reference.stress:.3g} MPa, {reference.time:.3g} s"
+        return f"log10 of the rate of {name} (1/s) at {reference.stress:.3g} MPa, {time_text(reference.time)}"
     unit = "" if param.unit == "1" else f", {param.unit}"
     return f"{'log10 of ' if param.scale == 'log' else ''}{name}: {param.meaning}{unit}"
 
@@ -149,8 +149,10 @@ def law_blocks(law: TemperatureLaw, figures: PageFigures | None = None, of: str 
     found = f"found from {count} temperatures, {celsius_text(low, high)}, and valid between them"
     blocks.append(Paragraph(f"{found}: the parameters follow these forms best: {chosen}; T_ref = {law.T_ref:.2f} K"))
     said = "the law does not fit" if rejected(law) else ""
-    rows = [
-        {"parameter": e.name, **value_cells(law.law, e), "by these tests": said or e.verdict} for e in law.estimates
+    symbols = symbols_of(law.law)
+    rows: list[dict[str, Cell]] = [
+        {"parameter": symbols[e.name], **value_cells(law.law, e), "by these tests": said or e.verdict}
+        for e in law.estimates
     ]
     blocks.append(Table.of("values of the temperature law", rows))
     if figures is not None:

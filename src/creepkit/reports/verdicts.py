@@ -6,7 +6,7 @@ creepkit.reports.words has the sentences, without a full stop.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,17 +15,25 @@ from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.evidence import DECISIVE_WEIGHT
 from creepkit.inverse.explanation import VERDICT_ODDS
 from creepkit.inverse.known_noise import FREEDOM_PER_FRAME, LEAST_NOISE_FREEDOM
+from creepkit.inverse.nuisance_parameters import DRIFT, OFFSET, Perturbation, beyond_intervals
 from creepkit.inverse.observation_vector import MINIMUM_RATE_OUTPUT, SINGLE_VALUES
+from creepkit.inverse.uncertainty.laplace_approximation import cut_intervals
+from creepkit.records import output_unit
 from creepkit.reports import words
 from creepkit.reports.blocks import first_of
-from creepkit.reports.remarks import challenge_text, nuisance_text
-from creepkit.reports.wording import amount_text, noises_text, say
+from creepkit.reports.wording import amount_text, first_kind, noises_text, say
+from creepkit.reports.words import CHALLENGES, PERTURBATIONS, REMARKS, SIZES
 
 if TYPE_CHECKING:
     from creepkit.inverse.adequacy import Adequacy, LargestDeviation
+    from creepkit.inverse.defect_correction import NumericalError
     from creepkit.inverse.explanation import Explanation
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.nuisance_plausibility import ImplausibleNuisance
+    from creepkit.inverse.selection.challenges import Challenge, PerturbationSize
     from creepkit.inverse.selection.ranking import Ranking
     from creepkit.inverse.single_values import ContradictingValues
+
 
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
@@ -196,10 +204,15 @@ def verdict_text(found: Adequacy | None) -> str:
     """The verdict in few words, with the p-value, or what is left in noises; "?" where nothing can be judged."""
     if found is None or found.verdict == "cannot be judged":
         return "?"
-    kind = "leaves" if found.discrepancy_in_noises > 0 else "rates"
-    if found.explanations and (found.lies_in_tests or kind == "rates"):
-        kind = "cause"
-    kind = "explains" if found.explains else "values" if found.contradicting is not None else kind
+    kind = first_kind(
+        {
+            "explains": found.explains,
+            "values": found.contradicting is not None,
+            "cause": found.explanations and (found.lies_in_tests or not found.discrepancy_in_noises > 0),
+            "leaves": found.discrepancy_in_noises > 0,
+            "rates": True,
+        }
+    )
     nuisance = "".join(one.kind for one in found.implausible[:1])
     return say(words.SHORT_VERDICTS[kind], found=found, cause=_cause(found), nuisance=nuisance)
 
@@ -310,13 +323,17 @@ def _of_best(ranking: Ranking) -> str:
 def _reason(ranking: Ranking) -> str:
     """Why a ranking of several laws is not decisive."""
     names, adequacy, unmet = [r.fit.law.name for r in ranking.credible], ranking.adequacy, ranking.unmet
-    refuted = _refuted(ranking) if "challenges" in unmet else []
-    kind = "apart" if len(names) > 1 else "challenged" if refuted and ranking.singled_out else "best"
-    if adequacy is not None and adequacy.rejects:
-        kind = "in tests" if adequacy.lies_in_tests else "none"
-    elif "asked" in unmet and adequacy is not None and adequacy.explains:
-        kind = "asked"
-    own = () if adequacy is None else adequacy.remedies
+    refuted, own = _refuted(ranking) if "challenges" in unmet else [], () if adequacy is None else adequacy.remedies
+    kind = first_kind(
+        {
+            "in tests": adequacy is not None and adequacy.rejects and adequacy.lies_in_tests,
+            "none": adequacy is not None and adequacy.rejects,
+            "asked": "asked" in unmet and adequacy is not None and adequacy.explains,
+            "apart": len(names) > 1,
+            "challenged": refuted and ranking.singled_out,
+            "best": True,
+        }
+    )
     found = {
         r.fit.law.name: [o.description for o in a.remedies]
         for r in ranking.laws
@@ -336,3 +353,122 @@ def _reason(ranking: Ranking) -> str:
         **of_adequacy,
         none=say(words.CHOICES["none asked" if asked > 1 else "one asked"], asked=asked),
     )
+
+
+NOTEWORTHY_CHANGE = 0.01
+"""Of the rate, from which on a perturbation is named."""
+
+
+LARGEST_PER_CENT = 0.4
+"""Of ln rate, from which on its change is given as a factor."""
+
+
+SMALLEST_SHOWN = 0.05
+"""Difference of two chi-squares below which they are shown as the same."""
+
+
+def remarks(fit: Identification, *, perturbations: bool = True) -> tuple[str, ...]:
+    """All of an identification; perturbations : whether also of what its intervals do not include."""
+    return (*fit.notes, *_of_numbers(fit), *(_not_included(fit.unmodelled) if perturbations else ()))
+
+
+def _of_numbers(fit: Identification) -> Iterator[str]:
+    if fit.provenance.get("search_ends") == 1:
+        yield REMARKS["one search"]
+    for one in fit.adequacy.implausible if fit.adequacy is not None else ():
+        yield nuisance_text(one, "implausible")
+    for name, bound in cut_intervals(fit.law, fit.estimates).items():
+        yield say(REMARKS["cut"], name=name, bound=bound)
+    if fit.numerical_error is not None:
+        yield numerical_error_text(fit.numerical_error)
+
+
+def numerical_error_text(found: NumericalError) -> str:
+    """What the predictor was wrong by, and what it would have done to the values."""
+    sizes = ", ".join(f"{_amount(size, output_unit(name))} in {name}" for name, size in found.size.items())
+    return say(REMARKS["numerical"], one=found, sizes=sizes, unsettled="" if found.settled else REMARKS["unsettled"])
+
+
+# ---- nuisances -------------------------------------------------------------------------------------------------------
+
+
+def nuisance_text(one: ImplausibleNuisance, kind: str = "nuisance") -> str:
+    """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"; kind : of REMARKS."""
+    share = say(REMARKS["of value" if one.output else "of length"], one=one) if np.isfinite(one.share) else ""
+    amounts = {"amount": _amount(one.value, one.unit), "size": _amount(one.size, one.unit)}
+    article, expected = "an" if one.kind[0] in "aeiou" else "a", say(REMARKS[one.size_source], one=one)
+    return say(REMARKS[kind], one=one, share=share, article=article, expected=expected, **amounts)
+
+
+def _amount(value: float, unit: str) -> str:
+    return f"{value:.2g} {unit}".strip()
+
+
+# ---- perturbations ---------------------------------------------------------------------------------------------------
+
+
+def change_text(change: float) -> str:
+    """Of ln of the rate: in per cent, a large one as a factor."""
+    return f"a factor of {np.exp(change):.2g}" if change >= LARGEST_PER_CENT else f"{100 * change:.2g} %"
+
+
+def combined_change_text(perturbations: Sequence[Perturbation]) -> str:
+    """The root sum of squares of the changes of the rate by those that are not included; "" where there are none."""
+    changes = [one.rate_change for one in beyond_intervals(perturbations)]
+    return change_text(float(np.linalg.norm(changes))) if changes else ""
+
+
+def test_change_text(one: Perturbation) -> str:
+    """By how much a drift changes the rate of a test at its end; "" of all else."""
+    return change_text(abs(one.per_kelvin) * one.size) if np.isfinite(one.per_kelvin) else ""
+
+
+def perturbation_text(one: Perturbation) -> str:
+    """By how much the rate amid the tests would move with what, to follow "would move"."""
+    several, kind = one.tests > 1, "drift" if one.kind == DRIFT else "error"
+    error = "offset" if one.kind.startswith(OFFSET) else "error"
+    cause = say(PERTURBATIONS[kind + "s" * several], one=one, error=error, what=_read(one.kind))
+    known = {"whence": "assumed" if one.assumed else "by the law", "deviation": " (one standard deviation)" * several}
+    energy = np.expm1(one.per_kelvin)
+    return say(PERTURBATIONS["moves"], change=change_text(one.rate_change), cause=cause, energy=energy, **known)
+
+
+def _not_included(perturbations: Sequence[Perturbation]) -> tuple[str, ...]:
+    """On what intervals do not include, with what it would do to the rate; none where that is little."""
+    told = [perturbation_text(p) for p in beyond_intervals(perturbations) if p.rate_change > NOTEWORTHY_CHANGE]
+    return (PERTURBATIONS["not included"].format(effects="; ".join(told)),) if told else ()
+
+
+def _read(kind: str) -> str:
+    return kind.removeprefix(OFFSET).replace("_", " ") if kind.startswith(OFFSET) else kind
+
+
+# ---- challenges ------------------------------------------------------------------------------------------------------
+
+
+def challenge_text(one: Challenge) -> str:
+    """What the tests allow beside the best law, to follow "but"."""
+    if one.kind == "unmodelled effect":
+        own, weight = one.weights or (np.nan, np.nan)
+        usual, sizes = one.sizes[0], [*map(_size_text, one.sizes)]
+        effect = Perturbation(usual.kind, usual.size, usual.unit).description
+        kind = "remedy" if one.laws else "effect"
+        return say(CHALLENGES[kind], one=one, sizes=sizes, effect=effect, own=own, weight=weight)
+    if one.excess is None:
+        return say(
+            CHALLENGES["unknown"], altered=say(CHALLENGES["unknown sum"], one=one) if one.kind == "sum" else one.subject
+        )
+    is_same = abs(one.excess) < SMALLEST_SHOWN
+    kind = "better" if one.fits_better else "higher" if one.excess > 0 and not is_same else "lower"
+    side, difference = ("the same", np.nan) if is_same else ("higher" if one.excess > 0 else "lower", abs(one.excess))
+    return say(CHALLENGES[kind], altered=say(CHALLENGES[one.kind], one=one), difference=difference, side=side)
+
+
+def _size_text(one: PerturbationSize) -> str:
+    """A perturbation with the size at which a law explains the tests."""
+    each = f"each of the {one.tests} tests" * (one.tests > 1)
+    kind = "length" if one.unit == "%" else "drift" if one.kind == DRIFT else "offset"
+    amount = f"{abs(one.size) if one.differs else one.size:{'' if one.differs else '+'}.2g} {one.unit}".strip()
+    of = {"what": _read(one.kind), "each": each, "where": each or "the test", "amount": amount}
+    smaller = "smaller" if one.size < 0 else "larger"
+    return say(SIZES[kind + "s" * one.differs], size=abs(one.size), smaller=smaller, **of)

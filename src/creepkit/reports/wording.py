@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.records import is_logarithmic, output_unit
 from creepkit.records.units import celsius_text, time_text
-from creepkit.reports.blocks import first_of
+from creepkit.reports.blocks import first_of, listed
 
 SMALLEST_SHOWN_P_VALUE, LARGEST_SHOWN_ODDS = 1e-12, 13.8
 """p-values below, and ln of odds above, are shown as such."""
@@ -30,21 +30,26 @@ def noises_text(noises: float) -> str:
 
 
 def odds_text(log_odds: float) -> str:
-    """Odds as a factor: "30 times"; log_odds : their ln."""
+    """Odds as "a factor of 30"; log_odds : their ln."""
     more = " or more" if log_odds > LARGEST_SHOWN_ODDS else ""
-    return f"{float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f} times{more}"
+    return f"a factor of {float(f'{np.exp(min(log_odds, LARGEST_SHOWN_ODDS)):.1g}'):,.0f}{more}"
+
+
+def shown_unit(output: str, specimen: str = "") -> tuple[float, str]:
+    """By what an output is multiplied where it is shown, and its unit then: strains in per cent."""
+    return (100.0, "%") if is_logarithmic(output) else (1.0, output_unit(output, specimen))
 
 
 def amount_text(value: float, output: str) -> str:
     """So much of an output, strains in per cent."""
-    percent = is_logarithmic(output)
-    return f"{(100.0 if percent else 1.0) * value:.2g} {'%' if percent else output_unit(output)}".strip()
+    factor, unit = shown_unit(output)
+    return f"{factor * value:.2g} {unit}".strip()
 
 
 FORMATS: Mapping[str, Callable[[Any], str]] = {
     "%": lambda share: f"{100 * share:.2g} %",
     "C": lambda kelvin: celsius_text(kelvin, kelvin),
-    "and": " and ".join,
+    "and": lambda names: listed(names) if names else "",
     "but": "; but ".join,
     "commas": ", ".join,
     "factors": lambda factors: " and ".join(f"{one:.3g}" for one in factors),
@@ -81,3 +86,8 @@ def say(text: str, /, **values: Any) -> str:
         return "" if {*said} & {"", "0", "nan"} else found[1]
 
     return _WORDS.vformat(_PART.sub(part, text), (), values)
+
+
+def first_kind(kinds: Mapping[str, object]) -> str:
+    """The first of the kinds of a table that holds; "" of none."""
+    return next((kind for kind, holds in kinds.items() if holds), "")

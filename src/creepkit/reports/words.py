@@ -45,6 +45,8 @@ TRUTHS = {
 """{kind: whether the law could be the true one}, at the end of a headline."""
 
 CAUTIONS = {
+    # tests at several temperatures, and a law that has none
+    "no temperature": "the tests are at {low:C} to {high:C}, and the law knows no temperature",
     # a value lies within 0.1 % of a bound of its search that is not physical
     "held": "{law} is held at {name} = {value}, the {end} bound of its search; to go on, write {wider}",
     # the search did not converge
@@ -63,10 +65,10 @@ CAUTIONS = {
     "noise unknown": "the noise of readings is not known: the law cannot be judged",
     # another law has a weight of 0.05 or more
     "undecided": "the tests cannot tell it apart from {laws}",
-    # an interval as wide as said there ends at a bound
-    "not determined": "{by} do not determine {names}",
-    # one so wide lies between its bounds
-    "hardly determined": "{by} hardly determine {names}",
+    # an interval as wide as said there ends at a bound; or lies between its bounds
+    "not determined": "{by} do not determine {names}<, and hardly {others}>",
+    # intervals so wide lie between their bounds
+    "hardly determined": "{by} hardly determine {others}",
     # leaving it out moves the exponent by more than 15 %
     "one test": "without test {test} the stress exponent is {change} {side}",
     # offsets or drifts would move rates
@@ -104,6 +106,8 @@ NEXT = {
     "check temperature": "check the temperature of {one.tests[0]}",
     # nothing so simple would
     "check record": "check the record of {one.tests[0]}",
+    # tests are at several temperatures, and the law has none
+    "temperature": "give the law a temperature: ck.with_arrhenius(law, tests)",
     # the search did not converge
     "search": "repeat the search with more starts (--starts {starts}, or starts in a study)< and bounds for {names}>",
     # the law is rejected, and one that was not tried has what it lacks
@@ -117,7 +121,7 @@ NEXT = {
     # it cannot be judged
     "noise": "state the noise of the readings in a column {column}",
     # laws have weights of 0.05 or more, and bars can tell them apart
-    "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor} times there",
+    "separate": "test at {stress} MPa, {celsius}, for {hours} h: {first} and {second} differ {factor:.2g} times there",
     # bars cannot
     "separate otherwise": "make a test that tells {first} from {second} (creepkit design)",
     # the law above a threshold stress explains the tests as well, and bars can tell
@@ -125,21 +129,20 @@ NEXT = {
     # bars cannot
     "threshold otherwise": "test at a lower stress, which tells whether there is a threshold (creepkit design)",
     # what nobody measured would take the weight from the best law
-    "measure": "measure the {effect} of the tests: one that nobody modelled would make another law the better",
+    "measure": "measure the {second} of the tests: one that nobody modelled would make another law the better",
     # what nobody modelled, of usual size, takes the rejection away; or the true stress held in place of the load
-    "remedy": "find out whether there was {remedy}: the law would then explain the tests",
+    "remedy": "check for {remedy}: the law would then explain the tests",
     # parameters are not determined, and a bar would do it
     "determine": "to determine {names}, test at {stress} MPa, {celsius}, for {hours} h: the rate is known least there",
     # a bar would not
     "determine otherwise": "make a test that determines {names} (creepkit design)",
-    # none of these
-    "use": "forecast (creepkit predict), or export the law to your code (creepkit export)",
-    # behind that, of bars
-    "narrow": "to narrow intervals, test at {stress} MPa, {celsius}, for {hours} h: a factor of {factor} there",
+    # none of these; bars may narrow intervals
+    "use": "forecast (creepkit predict), or export the law to your code (creepkit export)<; to narrow intervals, test "
+    "at {stress} MPa, {celsius}, for {hours} h: a factor of {factor:.2g} there>",
 }
 """{kind: what to do now}."""
 
-BRACKETS = "In brackets: 95 % intervals, of what one new test may show where this is said."
+BRACKETS = "In brackets: 95 % intervals, of one new test where it says so."
 """Below the numbers of an answer."""
 
 NEW_TEST = "{condition}, one new test"
@@ -148,22 +151,22 @@ NEW_TEST = "{condition}, one new test"
 OVER_ALL_TESTS, MEAN_SLOPE = "over all tests", "slope of the measured rates: {value}"
 """Where a stress exponent or activation energy is that of the measured rates; and beside the law's at one condition."""
 
+BY_REJECTED = "by the law, which the tests reject"
+"""Beside those of a law where the tests show none of their own."""
+
 MEAN_SLOPES = "slope of all rates: measured {measured}, law {predicted}"
 """Above the picture of minimum rates."""
 
 OTHER_N = "; n is a parameter, not the stress exponent"
 """Beside the values of a law in which they differ."""
 
-CODES = "In {codes} (creepkit export, also for other codes)"
+CODES = "In {codes} (creepkit export)"
 """Beside the files: the law's keyword, or the routine that it needs, in finite element codes."""
 
 ALL_DIGITS = "all digits{more}: details"
 """Behind the values of a law, which have four there."""
 
-CONSTANT_LOAD = (
-    "under a constant load the true stress rises with strain, here by up to {growth}: "
-    "the interval of the stress exponent rests on the form of the law too"
-)
+CONSTANT_LOAD = "a constant load lets the true stress rise, by up to {growth}: the interval rests on the law's form too"
 """Beside the exponent of such tests."""
 
 COMPARED = {
@@ -230,7 +233,8 @@ FORECAST = {
     # beside a time, where the law's curve reaches it at another
     "by values": "median of single tests; {hours} h by the law's values alone",
     # a caution, of a rejected law
-    "misses": "the law misses the rate of the nearest tests by a factor of {factor}<; intervals allow for {here} here>",
+    "misses": "the law misses the rate of the nearest tests ({at}) by a factor of {factor}"
+    "<; intervals allow for {here} here>",
     # one lies outside
     "next outside": "identify the law again with these tests (creepkit identify)",
     # it is extrapolated
@@ -247,7 +251,7 @@ FORECAST = {
 PLATE = {
     # always
     "headline": "best law: {first} in {count} of {materials}<, {others:commas}>, for {range}<; "
-    "the tests reject it in {rejecting}>",
+    "in {rejecting} the tests reject it>",
     # of some
     "failed": "of {failed} more no law was identified",
     # the search did not converge
@@ -329,7 +333,7 @@ CAUSES = {
     # two groups that labels of the tests tell apart, the faster first
     "stated groups": "{first} creeps {factor:.2g} times as fast as {other}",
     # curves and rates of tests disagree on the exponent
-    "curves": "the {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests",
+    "curves": "the law's {one.kind} is {low:.2g} by the shape of the curves and {high:.2g} by the rates of the tests",
     # curves and lives of tests disagree on how lives depend on stress
     "life exponent": "lives of the tests fall {faster} with stress than the law's, by a power of {size:.2g}",
     # it changes more than the law lets it
@@ -354,7 +358,7 @@ CAUSES_AT_LENGTH = {
     # the exponent or the energy
     "changes": "{cause}, more than this law lets it",
     # any, with the next likely one
-    "beside": "{cause}; {odds:odds} less likely: {other}",
+    "beside": "{cause}; less likely by {odds:odds}: {other}",
     # where that is about as likely
     "as likely": "{cause}; about as likely: {other}",
 }
@@ -440,7 +444,7 @@ SHORT_VERDICTS = {
     # what it misses has one cause
     "cause": "rejected: {cause}",
     # it misses readings
-    "leaves": "rejected: leaves {found.discrepancy_in_noises:noises} noises",
+    "leaves": "rejected: off by {found.discrepancy_in_noises:noises} times the noise",
     # it misses none
     "rates": "rejected: rates of tests are not followed",
 }
@@ -512,19 +516,17 @@ UNMET = {
 
 CHALLENGES = {
     # a usual error with which other laws explain the tests
-    "remedy": "with {sizes:or with} {one.laws:or} would explain them< (weight {weight:.2f})>",
+    "remedy": "with {sizes:or with} {one.laws:or} would explain the tests< (weight {weight:.2f})>",
     # one that takes the weight from the best
     "effect": "{effect}, which was not modelled, would leave it a weight of {own:.2f} ({one.other}: {weight:.2f})",
     # it was not examined
-    "unknown": "whether {altered} explains them as well could not be examined",
+    "unknown": "whether {altered} explains the tests as well could not be examined",
     # as it says
     "better": "{altered} fits better (its chi-square is {difference:.1f} {side})",
-    # chi-squares agree
-    "same": "{altered} explains them as well (its chi-square is the same)",
     # the chi-square is higher
-    "higher": "{altered} is not excluded (its chi-square is {difference:.1f} higher)",
-    # or lower
-    "lower": "{altered} explains them as well (its chi-square is {difference:.1f} lower)",
+    "higher": "{altered} is not excluded (its chi-square is {difference:.1f} {side})",
+    # it is lower or the same
+    "lower": "{altered} explains the tests as well (its chi-square is <{difference:.1f} >{side})",
     # what is altered: a share of another law
     "sum": "a share of {one.size:whole %} of the rate by {one.other}",
     # which was not examined

@@ -289,7 +289,7 @@ class RuptureAssessment(Presentable, Plotted, Tabulated):
         return write_assessment(self, path)
 
     shown_by = "rupture.rupture_answer"
-    detailed_by = "rupture.rupture_details"
+    detailed_by = "rupture.assessment_blocks"
 
 
 ISOTHERMAL_TOLERANCE = 5.0

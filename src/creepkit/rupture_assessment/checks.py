@@ -258,7 +258,7 @@ def _changed(
     if any(a is None or b is None for a, b in zip(original, repeated, strict=True)):
         lost = any(a is not None and b is None for a, b in zip(original, repeated, strict=True))
         text = "there is nothing to compare"
-        return AssessmentCheck(name, False if lost else None, text, f"no strength at {hours:.3g} h is left {name}")
+        return AssessmentCheck(name, False if lost else None, text, f"no strength at {hours:g} h is left {name}")
     if not original:
         return AssessmentCheck(name, None, "no strength can be stated at the temperatures asked for")
     changes = [b / a - 1.0 for a, b in zip(original, repeated, strict=True) if a is not None and b is not None]

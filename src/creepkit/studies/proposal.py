@@ -25,7 +25,7 @@ from creepkit.records import SECONDS_PER_HOUR, ZERO_CELSIUS, History, dimensions
 from creepkit.records.held_levels import held_temperatures
 from creepkit.records.units import celsius_text
 from creepkit.registry.reading import read_those_that_can_be
-from creepkit.reports.load_programs import kind_of_test, strain_rate
+from creepkit.reports.histories import kind_of_test, strain_rate
 from creepkit.studies.camera_proposal import found_cameras
 from creepkit.studies.study_file import parse_study
 
@@ -332,8 +332,8 @@ class DataSummary:
         units = {load_unit(history) for history in self.tests}
         loads = f"{len(self.loads)} level{'s' if several else ''} of load"
         if len(units) == 1:
-            loads += f", {self.loads[0]:g}"
-            loads += f" to {self.loads[-1]:g} {units.pop() or self.tests[0].loading.quantity}" if several else ""
+            ends = dict.fromkeys((f"{self.loads[0]:.4g}", f"{self.loads[-1]:.4g}"))
+            loads += f", {' to '.join(ends)} {units.pop() or self.tests[0].loading.quantity}"
         rates = [rate for history in self.tests if (rate := strain_rate(history)) is not None]
         if len(rates) == len(self.tests):
             loads = f"strain rates of {min(rates):.2g} to {max(rates):.2g} 1/s"

@@ -21,9 +21,9 @@ from creepkit.reports.contents import (
     ReportGroup,
     ReportProvenance,
     StageFailure,
+    identified_files,
     versions_of,
 )
-from creepkit.reports.identified_files import identified_files
 from creepkit.studies.execution import StageRecord
 from creepkit.studies.inputs import DATA_FILE, InputFile, StudyInputs, TestGroup
 from creepkit.studies.study_file import StudyFile

@@ -13,7 +13,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.records import Predictor, Status
-from creepkit.reports.prediction_bands import fitted_curves
+from creepkit.reports.identification_plot import fitted_curves
 from helpers.steady_rate_predictor import planted
 from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
 

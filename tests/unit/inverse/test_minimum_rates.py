@@ -140,7 +140,7 @@ def test_the_answer_says_rates_and_ends(whole_life, tmp_path):
     assert [r.measured for r in compared] == [h.minimum_rate for h in tests]
     assert all(r.low < r.predicted < r.high for r in compared)
     assert sum(r.low <= r.measured <= r.high for r in compared) >= len(tests) - 2
-    assert "10 minimum rates of tests without frames: predicted over measured" in fit.details()
+    assert "10 minimum rates of tests without curves: predicted over measured" in fit.details()
     assert "8 rupture times: predicted over measured" in fit.details()
     assert not any("nothing is predicted" in note for note in fit.notes)
     assert len([a for a in fit.plot(tmp_path / "fit.png").axes if a.get_xlabel()]) == 2

@@ -12,7 +12,7 @@ import creepkit as ck
 from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.uncertainty.rate_scatter import log_prior, rate_scatter
 from creepkit.language.symbols import GAS_CONSTANT
-from creepkit.reports.cautions import cautions
+from creepkit.reports.advice import cautions
 from creepkit.reports.verdicts import cause_headline
 
 HOUR, T_REF = 3600.0, 873.15

@@ -27,8 +27,8 @@ from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, constant_strain, constant_stress
 from creepkit.records.units import time_text
+from creepkit.reports.advice import cautions
 from creepkit.reports.answer import key_figures
-from creepkit.reports.cautions import cautions
 from creepkit.specimens.relaxation import Relaxation
 from helpers.literature_laws import EQUATIONS
 from helpers.rate_tables import GAS_CONSTANT, KACHANOV_VALUES, rate_table, whole_life_table

@@ -16,7 +16,7 @@ from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, PressureJump, Program, RecordedLoading, constant_stress, known_specimens
-from creepkit.reports.cautions import cautions
+from creepkit.reports.advice import cautions
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.uniaxial import Uniaxial
 from helpers.steady_rate_predictor import Steady, planted

@@ -9,7 +9,7 @@ import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import HISTORY_CSV, write_history
 from creepkit.records import History, RecordedLoading, StrainSteps, StressSteps
-from creepkit.reports.load_programs import kind_of_test
+from creepkit.reports.histories import kind_of_test
 
 HOT = "# temperature_C: 850\n"
 SAID = "# control: load\n# strain_measure: engineering\n"

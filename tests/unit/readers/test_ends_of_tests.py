@@ -175,10 +175,19 @@ def test_what_sentences_say():
 
 
 @pytest.mark.parametrize(
-    ("remark", "hours"), [("ruptured after 453.1 h, A = 22 %", 453.1), ("gebrochen bei 20 h", None)]
+    ("remark", "hours"),
+    [
+        ("Remark: ruptured after 453.1 h, A = 22 %", 453.1),
+        ("Remark: gebrochen bei 20 h", None),
+        ("specimen ruptured at 453.1 h, A = 22 %", 453.1),
+        ("Bruch nach 453,1 h", 453.1),
+        ("ruptured", 452.0),
+        ("rupture elongation 22 % after 453.1 h", None),
+        ("not ruptured", None),
+    ],
 )
 def test_a_remark_above_a_curve_says_when_it_ruptured(tmp_path, remark, hours):
-    head = f"# stress_MPa: 120\n# temperature_C: 600\n# Remark: {remark}\n"
+    head = f"# stress_MPa: 120\n# temperature_C: 600\n# {remark}\n"
     (tmp_path / "a.csv").write_text(f"{head}Time (h);Strain (%)\n0;0\n452;5\n")
     (test,) = ck.read_histories(tmp_path)
     assert test.rupture_time == (hours and pytest.approx(3600.0 * hours))

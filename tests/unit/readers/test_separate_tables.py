@@ -154,3 +154,61 @@ def test_columns_of_one_table_are_not_parted(tmp_path):
     twice = [["T (°C)", "Stress (MPa)", "t_r (h)", "t_r (h)"], [600, 120, 800, 810]]
     with pytest.raises(HistoryError, match="mean the same"):
         ck.read_histories(workbook(tmp_path / "y.xlsx", {"S": twice}))
+
+
+@pytest.mark.parametrize("in_sheets", [False, True])
+def test_a_test_with_its_rate_and_its_rupture_in_two_tables_is_one(tmp_path, in_sheets):
+    of_rates = [
+        ["Test", "T (°C)", "Stress (MPa)", "min. creep rate (1/h)"],
+        ["A1", 600, 120, 1e-5],
+        ["A2", 600, 99, 4e-6],
+    ]
+    of_ends = [["Test", "T (°C)", "Stress (MPa)", "t_r (h)"], ["A1", 600, 120, 800], ["A3", 600, 80, ">9000"]]
+    sheets = {"1": of_rates, "2": of_ends} if in_sheets else {"1": beside(of_rates, of_ends)}
+    tests = {test.name: test for test in ck.read_histories(workbook(tmp_path / "x.xlsx", sheets))}
+    assert [*tests] == ["A1", "A2", "A3"]
+    assert (tests["A1"].minimum_rate, tests["A1"].rupture_time) == (pytest.approx(1e-5 / 3600), 800 * 3600)
+    of_ends[1][2] = 140
+    sheets = {"1": of_rates, "2": of_ends} if in_sheets else {"1": beside(of_rates, of_ends)}
+    with pytest.raises(HistoryError, match="test 'A1' already stands in"):
+        ck.read_histories(workbook(tmp_path / "y.xlsx", sheets))
+
+
+def test_tests_in_columns(tmp_path):
+    """A sheet of results turned by a quarter: each test stands in a column, as places tell."""
+    text = "Test piece;A1;A2\nTemperature (°C);600;650\nStress (MPa);140;120\nRupture time (h);812;>5000\n"
+    text += "Minimum creep rate (1/h);1.2e-4;1.6e-5\nElongation after fracture (%);22;\n"
+    (tmp_path / "x.csv").write_text(text, encoding="utf-8")
+    one, two = ck.read_histories(tmp_path / "x.csv")
+    assert (one.name, one.rupture_time, two.unruptured, two.times[-1]) == ("A1", 812 * 3600, True, 5000 * 3600)
+    assert [test.minimum_rate for test in (one, two)] == pytest.approx([1.2e-4 / 3600, 1.6e-5 / 3600])
+    assert [round(test.temperature - 273.15) for test in (one, two)] == [600, 650]
+    (tmp_path / "x.csv").write_text(text.replace("140", "many"), encoding="utf-8")
+    with pytest.raises(HistoryError, match=r"x\.csv, sheet '\(columns as rows\)', row 2"):
+        ck.read_histories(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize("column", ["Type;smooth;notched", "Kt;1;3.6"])
+def test_a_notched_bar_is_no_plain_one(tmp_path, column):
+    name, *cells = column.split(";")
+    rows = "".join(f"R{k};650;700;{100 * k};{cell}\n" for k, cell in enumerate(cells, 1))
+    (tmp_path / "n.csv").write_text(f"Test;T (°C);Stress (MPa);t_r (h);{name}\n{rows}", encoding="utf-8")
+    with pytest.raises(
+        HistoryError, match=f"'{name}' is '{cells[1]}', and the stress of a notched bar is no plain one"
+    ):
+        ck.read_histories(tmp_path / "n.csv")
+    (tmp_path / "tests.toml").write_text('["n.csv".tests.R2]\nexclude = "notched"\n')
+    (test,) = ck.read_histories(tmp_path / "n.csv")
+    assert test.rupture_time == 100 * 3600
+
+
+def test_points_between_thousands_and_hours_of_a_title(tmp_path):
+    """One number has both signs, so that the others are decided; a title has the unit of all times."""
+    (tmp_path / "g.csv").write_text("T [°C];Spannung [MPa];Bruchzeit [h]\n550;180;1.234,5\n550;140;> 30.000\n")
+    one, two = ck.read_histories(tmp_path / "g.csv")
+    assert (one.rupture_time, two.times[-1], two.unruptured) == (1234.5 * 3600, 30000 * 3600, True)
+    text = "Hours to produce a creep strain at 1500 F\nStress psi,0.1%,1.0%,Rupture\n15000,12,240,610\n"
+    (tmp_path / "h.csv").write_text(text)
+    (test,) = ck.read_histories(tmp_path / "h.csv")
+    assert [*(test.times / 3600), test.rupture_time / 3600] == [12, 240, 610]
+    assert test.temperature == pytest.approx(1088.71, abs=0.01)

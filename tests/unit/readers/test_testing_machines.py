@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
+from creepkit.errors import HistoryError
 from helpers.command_line import creepkit
 
 MODULUS, STRESS, RAMP = 155e3, 120.0, 60.0
@@ -178,3 +179,93 @@ def test_a_run_out_whose_time_stands_in_a_remark_that_was_answered(tmp_path: Pat
     assert (first.temperature, first.rupture_time) == (pytest.approx(873.15), pytest.approx(9783 * 3600))
     assert second.unruptured
     assert second.times[-1] == pytest.approx(40215 * 3600)
+
+
+HOURS = np.array([0.0, 1, 3, 10, 30, 100, 300])
+CREPT = 1e-3 * (1.0 - np.exp(-HOURS / 20.0)) + 1e-5 * HOURS
+REPORTS = {
+    "symbols behind names": (
+        '"Prüfkraft F";"6031,9";"N"\n"Durchmesser d0";"8,00";"mm"\n"Messlänge L0";"40,00";"mm"\n'
+        '"Prüftemperatur T";"600";"°C"\n\n"Prüfzeit";"Extensometerweg"\n"h";"µm"\n',
+        lambda t, e: f'"{t:.1f}";"{4e4 * e:.4f}"'.replace(".", ","),
+    ),
+    "names above values": (
+        "Results 1\n,Specimen label,Creep stress (MPa),Temperature (C)\n1,B7,120.0,600\n\nTime,Strain\n(hr),(%)\n",
+        lambda t, e: f"{t},{100 * e:.6f}",
+    ),
+    "keys behind the title of their line": (
+        "Header:\t\tTime:\t0.51953\tSec\nStress:\t120\tMPa\nTemperature:\t600\tC\nTime\tAxial Strain\nSec\tmm/mm\n",
+        lambda t, e: f"{3600 * t:.3f}\t{e:.9f}",
+    ),
+    "divisions of a dial gauge": (
+        "Stress (MPa);120\nTemperature (C);600\nGauge length (mm);25\nTime (h);Extension (0.001 mm)\n",
+        lambda t, e: f"{t};{25e3 * e:.5f}",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", REPORTS)
+def test_heads_of_reports(tmp_path: Path, kind: str) -> None:
+    head, row = REPORTS[kind]
+    rows = [row(float(t), float(e)) for t, e in zip(HOURS, CREPT, strict=True)]
+    (tmp_path / "report.txt").write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    (history,) = ck.read_histories(tmp_path / "report.txt")
+    assert history.times / 3600 == pytest.approx(HOURS)
+    assert history.outputs["strain"] == pytest.approx(CREPT, abs=2e-8)
+    assert history.temperature == pytest.approx(873.15)
+    assert history.loading.program().values[-1] == pytest.approx(120.0, rel=1e-3)
+
+
+def test_a_sheet_of_the_european_creep_committee(tmp_path: Path) -> None:
+    """Symbols of ISO 204 for times to strains, codes of ends behind the name of their column, durations."""
+    head = "Cast;Temp. (°C);Stress (MPa);Test duration (h);Status B / UB / I;tp0.2 (h);tf1 (h)\n"
+    rows = "E1;600;180;1254;B;125;564\nE1;600;120;31044;UB;3104;\nE2;600;110;22345;I;2234;9000\n"
+    (tmp_path / "E.csv").write_text(head + rows, encoding="utf-8")
+    with pytest.raises(HistoryError, match="says 'I': did these tests break") as error:
+        ck.read_histories(tmp_path / "E.csv")
+    assert 'ended = {I = "stopped"}' in str(error.value)
+    (tmp_path / "tests.toml").write_text('["E.csv"]\nended = {I = "stopped"}\n')
+    tests = ck.read_histories(tmp_path / "E.csv")
+    assert tests[0].rupture_time == 1254 * 3600
+    assert [test.unruptured for test in tests] == [False, True, True]
+    assert [test.times[-1] / 3600 for test in tests] == [564, 31044, 22345]
+    assert tests[0].outputs["strain"] == pytest.approx([0.002, 0.01])
+    (tmp_path / "E.csv").write_text((head + rows).replace("Status B / UB / I", "Column 5"), encoding="utf-8")
+    (tmp_path / "tests.toml").unlink()
+    with pytest.raises(HistoryError, match="says how long the test lasted, and nothing whether it broke"):
+        ck.read_histories(tmp_path / "E.csv")
+
+
+def test_rates_over_reciprocal_temperatures(tmp_path: Path) -> None:
+    """The digitised points of an Arrhenius plot."""
+    kelvin, rates = (823.15, 873.15, 923.15), (1e-10, 2e-9, 3e-8)
+    rows = "".join(f"{1e4 / T:.6f},100,{math.log10(rate):.6f}\n" for T, rate in zip(kelvin, rates, strict=True))
+    (tmp_path / "p.csv").write_text(f"10^4/T (1/K),Stress (MPa),log10 creep rate (1/s)\n{rows}")
+    tests = ck.read_histories(tmp_path / "p.csv")
+    assert [test.temperature for test in tests] == pytest.approx(kelvin, abs=1e-3)
+    assert [test.minimum_rate for test in tests] == pytest.approx(rates, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "title", ["Creep test 7, 120 MPa, 600 C", "Alloy 617, 600 °C, 120 MPa", "[Inconel 625], 600 C, 120 MPa"]
+)
+def test_the_number_of_a_test_or_an_alloy_is_no_range(tmp_path: Path, title: str) -> None:
+    rows = "".join(f"{t};{100 * e:.6f};{100 * e + 0.1:.6f}\n" for t, e in zip(HOURS, CREPT, strict=True))
+    (tmp_path / "a.csv").write_text(
+        f"[Data]\n{title}\nTime (h);Creep strain (%);Total strain (%)\n{rows}", encoding="utf-8"
+    )
+    (history,) = ck.read_histories(tmp_path / "a.csv")
+    assert (history.temperature, history.loading.program().values[-1]) == (873.15, 120.0)
+    assert history.outputs["strain"] == pytest.approx(CREPT, abs=1e-8)
+    assert "'Creep strain (%)' counts and not 'Total strain (%)'" in history.labels["assumed"]
+
+
+def test_readings_behind_a_rupture_are_asked_of(tmp_path: Path) -> None:
+    said = {2: "broke", 6: ""}
+    rows = "".join(f"{t};{100 * e:.4f};{said.get(k, '')}\n" for k, (t, e) in enumerate(zip(HOURS, CREPT, strict=True)))
+    (tmp_path / "a.csv").write_text(f"Stress (MPa);120\nTemperature (C);600\nTime (h);Strain (%);Remarks\n{rows}")
+    with pytest.raises(HistoryError, match="'broke' in line 6 says that the test broke, and readings follow"):
+        ck.read_histories(tmp_path / "a.csv")
+    (tmp_path / "tests.toml").write_text('["a.csv"]\nended = {broke = "label"}\n')
+    (history,) = ck.read_histories(tmp_path / "a.csv")
+    assert history.rupture_time is None

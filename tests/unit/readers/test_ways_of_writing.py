@@ -10,6 +10,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.readers.ends_of_tests import end_said_by, kind_of_column
+from creepkit.records import constant_stress
 from helpers.workbooks import workbook
 
 HEAD = "Temperature (C);600\nStress (MPa);120\n"
@@ -258,3 +259,11 @@ def test_a_sheet_of_a_diagram_does_not_hinder_the_others(tmp_path):
     (test,) = ck.read_histories(workbook(tmp_path / "d.xlsx", {"T1": curve, "plot": diagram, "chart": [["Time (h)"]]}))
     is_planted(test)
     assert "sheet 'plot' not read as it has no column of time above readings" in test.labels["assumed"]
+
+
+def test_what_stands_in_brackets_behind_a_condition_is_a_note_or_what_was_held(tmp_path):
+    head = "# stress: 180 MPa (true stress held)\n# temperature: 600 °C (three thermocouples)\n"
+    (tmp_path / "a.csv").write_text(f"{head}time (h),strain (%)\n0,0\n10,0.1\n20,0.2\n", encoding="utf-8")
+    (test,) = ck.read_histories(tmp_path)
+    assert (test.loading, test.temperature) == (constant_stress(180.0, "stress"), 873.15)
+    assert test.labels["temperature (note)"] == "three thermocouples"

@@ -24,8 +24,7 @@ from creepkit.records import History, Program, constant_stress, load_steps
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.figures import empty_figure, logarithmic_labels, set_range
 from creepkit.reports.forecast import forecast_figure
-from creepkit.reports.identification_plot import small_multiples
-from creepkit.reports.prediction_bands import curve_of_test, fitted_curves, joint_covariance
+from creepkit.reports.identification_plot import curve_of_test, fitted_curves, joint_covariance, small_multiples
 from creepkit.reports.ranking import MOST_TESTS_DRAWN, misfit_name, misfits
 from creepkit.reports.rate_panels import own_rates
 from creepkit.reports.svg import svg_text

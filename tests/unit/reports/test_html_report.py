@@ -24,15 +24,14 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import Histories
+from creepkit.reports.advice import cautions, next_step
 from creepkit.reports.answer import interval_digits, key_figures
 from creepkit.reports.blocks import typeset
-from creepkit.reports.cautions import cautions
 from creepkit.reports.compared_values import judged_readings
 from creepkit.reports.contents import ReportContents, ReportGroup, StageFailure
 from creepkit.reports.html import report_html
-from creepkit.reports.next_steps import next_step
 from creepkit.reports.rate_panels import plate_figure
-from creepkit.reports.remarks import combined_change_text
+from creepkit.reports.verdicts import combined_change_text
 from helpers.rate_tables import whole_life_table
 from helpers.report_pages import contents, ranking
 from helpers.steady_rate_predictor import Steady, planted

@@ -6,22 +6,28 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.reports.answer import codes_text, table_of_groups
+from creepkit.reports.advice import LACKING, cautions, further_test, law_to_try, next_step
+from creepkit.reports.answer import codes_text, key_figures, table_of_groups
 from creepkit.reports.description import NewTestInterval
-from creepkit.reports.next_steps import LACKING, further_test, law_to_try, next_step
-from creepkit.reports.words import NEXT
+from creepkit.reports.identification_plot import curve_of_test, fitted_curves
+from creepkit.reports.words import BY_REJECTED, NEXT
 
 STRESSES = np.array([80.0, 110.0, 150.0, 200.0])
 AMID = float(np.exp(np.log(STRESSES).mean()))
 
 
-def bars(strain=lambda x: x, n=4.0):
-    """Bars whose strain is 0.02 `strain` of the time over that in which 1e-9 (s/AMID)^n 1/s makes 0.02; noise 1 %."""
+def bars(strain=lambda x: x, n=4.0, side=1.0):
+    """Bars whose strain is 0.02 `strain` of the time over that in which 1e-9 (s/AMID)^n 1/s makes 0.02; noise 1 %.
+
+    side : -1 of compression.
+    """
     rng, shares = np.random.default_rng(3), np.linspace(0.02, 0.98, 30)
     durations = 0.02 / (1e-9 * (STRESSES / AMID) ** n)
     values = [0.02 * strain(shares) * np.exp(0.01 * rng.standard_normal(shares.size)) for _ in STRESSES]
     return [
-        ck.History(f"b{s:g}", shares * end, {"strain": one}, ck.constant_stress(s, control="stress"), 900.0)
+        ck.History(
+            f"b{s:g}", shares * end, {"strain": side * one}, ck.StressSteps(((0, side * s),), control="stress"), 900.0
+        )
         for s, end, one in zip(STRESSES, durations, values, strict=True)
     ]
 
@@ -39,6 +45,15 @@ def test_the_law_to_try_has_the_part_of_the_curves_that_this_one_misses():
     assert next_step(early, searched=[one.format(law="norton") for one in LACKING["early"]]) == NEXT["within"]
     late = ck.identify("norton", bars(lambda x: -np.log(1 - x)))
     assert law_to_try(late, ["mpc-omega*arrhenius"]) == ("kachanov-rabotnov", "late")
+
+
+def test_a_law_without_temperature_is_told_so_before_its_tests_are_two_groups():
+    """Four bars at 627 °C, and four that creep 40 times as fast for being at 727 °C."""
+    hotter = [h.replace(name=f"hot {h.name}", times=h.times / 40.0, temperature=1000.0) for h in bars()]
+    fit = ck.identify("norton", [*bars(), *hotter])
+    assert cautions(fit)[0] == "the tests are at 626.9 °C to 726.9 °C, and the law knows no temperature"
+    assert next_step(fit) == NEXT["temperature"]
+    assert not any("two groups" in one for one in cautions(fit))
 
 
 def test_the_test_that_tells_most_of_a_power_law_is_farthest_from_those_that_were_made(steady):
@@ -87,3 +102,15 @@ def test_the_row_of_an_alloy_states_its_law_its_exponent_and_its_rate_with_inter
     assert [values[0] for values in ends] == pytest.approx([4.0, 1e-9 * 3.6e5], rel=0.03)
     assert all(low < value < high for value, low, high in ends)
     assert float(stress) == pytest.approx(AMID, rel=0.01)
+
+
+def test_a_rejected_law_shows_its_own_numbers_where_pressed_bars_show_none_and_their_strains_over_decades():
+    fit = ck.identify("norton", bars(lambda x: x + 0.5 * (1 - np.exp(-10 * x)), side=-1.0))
+    assert fit.adequacy.rejects
+    exponent, rate = key_figures(fit)
+    assert (exponent.name, exponent.remark, rate.name) == ("stress exponent", BY_REJECTED, "creep rate")
+    assert exponent.low < 4.0 < exponent.high
+    curve = curve_of_test(fit, fitted_curves(fit), 0, "strain")
+    assert (curve.label, curve.logarithmic) == ("compressive strain, %", True)
+    assert curve.measured[-1] == pytest.approx(100 * 0.02 * 1.48, rel=0.04)
+    assert np.nanmax(np.abs(np.log(curve.identified / curve.measured))) < 1.0

@@ -3,13 +3,15 @@
 import ast
 import re
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
+import pytest
 
 from creepkit.inverse.selection import rank
 from creepkit.inverse.uncertainty.correlation import Correlation
 from creepkit.laws.norton import NORTON
-from creepkit.reports import words
+from creepkit.reports import words, words_of_methods
 from creepkit.reports.blocks import Answer
 from creepkit.reports.wording import say
 from helpers.log_rate_predictor import known_scatter, measured
@@ -25,8 +27,9 @@ def test_records_print_as_text() -> None:
     assert [text for text in texts if not text.strip() or "object at" in text] == []
 
 
-def test_every_text_is_short_and_says_when_it_is_said() -> None:
-    text = Path(words.__file__).read_text(encoding="utf-8")
+@pytest.mark.parametrize("module", [words, words_of_methods])
+def test_every_text_is_short_and_says_when_it_is_said(module: ModuleType) -> None:
+    text = Path(str(module.__file__)).read_text(encoding="utf-8")
     lines, tables = text.splitlines(), [one for one in ast.walk(ast.parse(text)) if isinstance(one, ast.Dict)]
     keys = [key for table in tables for key in table.keys if key is not None]
     assert [lines[key.lineno - 1] for key in keys if not lines[key.lineno - 2].startswith("    # ")] == []

@@ -126,6 +126,12 @@ def test_a_strength_without_an_interval_says_why_beside_it():
     ]
 
 
+def test_a_page_of_ruptures_begins_with_the_strengths_and_their_picture(tmp_path):
+    page = ck.report(ck.rupture(planted(larson_miller, count=20)), tmp_path / "page.html").read_text()
+    assert page.index("rupture strength</dt>") < page.index("<table>")
+    assert page.index("time to rupture, h</text>") < page.index("<table>")
+
+
 def test_one_temperature_has_its_own_method():
     tests = [t for t in planted(larson_miller, count=45) if t.temperature == 873.15]
     assessment = ck.rupture(tests)

@@ -19,7 +19,7 @@ import creepkit as ck
 from creepkit.errors import StudyError
 from creepkit.files.writing import write_text
 from creepkit.reports.html.page import report_html
-from creepkit.reports.remarks import challenge_text
+from creepkit.reports.verdicts import challenge_text
 from helpers.study_runs import ONE_FIT, STUDY, made, numbers, study_in
 
 

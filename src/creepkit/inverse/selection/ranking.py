@@ -241,7 +241,7 @@ class ModelAverage(RateStatements, Presentable):
         freedom = np.full(len(self.fits), NORMAL_FREEDOM)
         return MixtureDistribution(np.array(self.weights), freedom, location, scale).interval()
 
-    shown_by = "inference.model_average_text"
+    shown_by = "identification.model_average_text"
 
 
 def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:

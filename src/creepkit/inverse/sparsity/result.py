@@ -75,9 +75,9 @@ class Sparsity(Presentable):
     @property
     def verdict(self) -> str:
         """What was dropped, and what that cost, in one sentence."""
-        return str(function_of_reports("inference.sparsity_verdict")(self))
+        return str(function_of_reports("identification.sparsity_verdict")(self))
 
-    shown_by = "inference.sparsity_text"
+    shown_by = "identification.sparsity_text"
 
 
 TermNames = tuple[str, ...]

@@ -59,7 +59,7 @@ class Correlation(Presentable):
                 raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
         return float(self.matrix[self.names.index(first), self.names.index(second)])
 
-    shown_by = "inference.correlation_text"
+    shown_by = "identification.correlation_text"
 
 
 @checked
@@ -128,7 +128,7 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
     names = [fit.law.names[k] for k in group]
     if len(group) == 1:
         estimate, param = fit.estimates[group[0]], fit.law.table[names[0]]
-        of_bounds = f"fills {float(_relative_widths(fit)[group[0]]):.0%} of its bounds"
+        of_bounds = f"fills {100 * float(_relative_widths(fit)[group[0]]):.0f} % of its bounds"
         width = f"spans a factor of {estimate.high / estimate.low:.2g}" if param.scale == "log" else of_bounds
         interval = f"its interval [{estimate.low:.3g}, {estimate.high:.3g}] {width}"
         return f"the parameter {names[0]} ({param.meaning}) is {estimate.verdict}: {interval}"

@@ -147,7 +147,7 @@ class PosteriorSamples(RateStatements, Presentable, Tabulated):
 
         return to_arviz(self)
 
-    shown_by = "inference.posterior_text"
+    shown_by = "identification.posterior_text"
 
 
 @checked

@@ -6,26 +6,20 @@ from collections.abc import Sequence
 from functools import singledispatch
 from itertools import count
 
-from creepkit.experiments.planned_design import Design
-from creepkit.forecasts.forecast import Forecast
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.ranking import Ranking
 from creepkit.language import CreepLaw
 from creepkit.records import Histories, History, Specimen
+from creepkit.records.presentable import Presentable, function_of_reports
 from creepkit.reports.answer import equations
 from creepkit.reports.blocks import Block, Formula, Paragraph, Verbatim, plural
 from creepkit.reports.catalogue import specimen_blocks
 from creepkit.reports.contents import ReportContents, ReportGroup
-from creepkit.reports.design import design_blocks
-from creepkit.reports.forecast import forecast_blocks
 from creepkit.reports.histories import history_blocks, tests_figure
-from creepkit.reports.html.page import block_shown, findings_section, group_answer
-from creepkit.reports.html.templates import template
+from creepkit.reports.html.page import block_shown, findings_section, group_answer, template
 from creepkit.reports.law_names import LawNames, symbols_table
 from creepkit.reports.ranking import ranking_blocks
-from creepkit.reports.rupture import rupture_blocks, strength_blocks
 from creepkit.reports.svg import PageFigures
-from creepkit.rupture_assessment.assessment import RuptureAssessment
 
 STYLE = (
     ".creepkit .seen .scroll{display:grid;grid-template-columns:repeat(auto-fit,minmax(18rem,1fr));gap:0 1rem}"
@@ -59,7 +53,10 @@ def _figures() -> PageFigures:
 
 @singledispatch
 def _blocks(record: object) -> Sequence[Block]:
-    """The text of a terminal, of records that have nothing else."""
+    """Its details with figures, of a record that has these as blocks; of others the text of a terminal."""
+    if isinstance(record, Presentable) and record.detailed_by:
+        blocks: Sequence[Block] = function_of_reports(record.detailed_by)(record, _figures())
+        return blocks
     return [Verbatim(type(record).__name__, str(record))]
 
 
@@ -85,9 +82,6 @@ def _(tests: Histories) -> Sequence[Block]:
 
 _blocks.register(History)(lambda history: _blocks(Histories([history])))
 _blocks.register(Specimen)(specimen_blocks)
-_blocks.register(Forecast)(lambda forecast: forecast_blocks(forecast, _figures()))
-_blocks.register(Design)(lambda design: design_blocks(design, _figures()))
-_blocks.register(RuptureAssessment)(lambda one: [*strength_blocks(one), *rupture_blocks(one, _figures())])
 
 
 @_blocks.register

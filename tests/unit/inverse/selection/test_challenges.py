@@ -29,7 +29,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, StressSteps, constant_stress
-from creepkit.reports.remarks import challenge_text
+from creepkit.reports.verdicts import challenge_text
 from helpers.planted_bars import BAR, END, SPL, M, N, bars
 from helpers.steady_rate_predictor import Steady, planted
 
@@ -153,7 +153,7 @@ def test_what_rests_on_a_furnace_that_nobody_watched_is_not_decisive():
     (drift,) = (c for c in found.challenges if c.kind == "unmodelled effect")
     assert drift.subject == "temperature drift"
     size = r"with independent drifts of the temperature of up to ([\d.]+) K over each of the 3 tests"
-    said = re.fullmatch(rf"{size} time-hardening would explain them \(weight 0\.\d\d\)", challenge_text(drift))
+    said = re.fullmatch(rf"{size} time-hardening would explain the tests \(weight 0\.\d\d\)", challenge_text(drift))
     assert 0.0 < float(said[1]) < 5.0
     assert challenge_text(drift) in found.verdict
 

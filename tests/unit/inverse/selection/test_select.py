@@ -306,7 +306,7 @@ def test_an_export_of_a_ranking_carries_its_verdict():
 
 
 THINNER = Challenge("unmodelled effect", "thickness", sizes=(PerturbationSize("thickness", -4.8, "%"),), laws=("sinh",))
-SMALLER = "with a thickness 4.8 % smaller sinh would explain them"
+SMALLER = "with a thickness 4.8 % smaller sinh would explain the tests"
 NONE = "not decisive: none of {} laws tried explains the tests"
 APART = "not decisive: of 3 laws tried these tests cannot tell apart norton and sinh"
 SENTENCES = [

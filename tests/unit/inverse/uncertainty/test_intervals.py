@@ -19,7 +19,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import Estimate, cut_int
 from creepkit.inverse.uncertainty.mixture_distribution import MixtureDistribution
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
-from creepkit.reports.remarks import remarks
+from creepkit.reports.verdicts import remarks
 from helpers.log_rate_predictor import known_scatter, least_squares, measured
 from helpers.steady_rate_predictor import Steady, planted
 
