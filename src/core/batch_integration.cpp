@@ -17,6 +17,7 @@ struct BatchIntegration {
     const double* beta;              // (C,) leading exponents of time
     const double* initial;           // (S,) states at time zero
     const double* limits;            // (S,) values at which the point has failed, inf for none
+    const double* back_stresses;     // (S,) 1 of states that are back stresses of a bar, else 0; null where none is
     const double* stress_controls;   // (K, 2) stiffness, MPa, and load, 0 or 1
     const double* segments;          // (segments, 6) start, end, s; driving stress at both, MPa; temperature at both, K
     const int64_t* segment_offsets;  // (K + 1,)
@@ -56,6 +57,7 @@ CREEPKIT_API int64_t creepkit_integrate_batch(const BatchIntegration* batch) {
     StepWorkspace(memory, batch->states, P, batch->tableau.stages);
     if (!memory.allocate()) return BATCH_OUT_OF_MEMORY;
     StepWorkspace work(memory, batch->states, P, batch->tableau.stages);
+    work.back = {batch->back_stresses};
     const int64_t F = batch->time_offsets[K], L = batch->level_offsets[K];
     const SlopePredictor predictor(batch->tableau);
     const bool exact = batch->with_sensitivities != 0;

@@ -103,8 +103,8 @@ private:
         const double stiffness = larger(0.0, now.modulus * shed / work.rates[fastest]);
         const double heated = segment.temperature(segment.end());
         const double row[6] = {segment.start(), segment.end(), 0.0, sign * driven * length, now.temperature, heated};
-        const CurveBend curve = curve_bend({stiffness, 0.0, axes_of(sign)}, Segment(row), fabs(work.stress[fastest]),
-                                           rate, work.rows + fastest * work.width, work.out, 1 + S);
+        const CurveBend curve = curve_bend({stiffness, 0.0, axes_of(sign)}, Segment(row), BackStresses{}, rate,
+                                           work.rows + fastest * work.width, work.out, 1 + S);
         return shifted_power_law_time(segment.start(), length, curve.bend, curve.rate);
     }
 

@@ -101,17 +101,40 @@ private:
         return done;
     }
 
+    // The rate of a bar's back stress where it does not flow, MPa/s along the flow.
+    double recovery(const Segment& segment) const {
+        if (!work.back.any()) return 0.0;
+        work.row[TIME] = segment.start;
+        work.row[TEMPERATURE] = segment.temperature;
+        for (int64_t v = 1; v < work.unknowns(); ++v) work.row[POINT_SIZE + v - 1] = work.value[v];
+        write_point(work.row, test.drive.along(work.sign).axes, work.back_stress(work.value), work.value[0]);
+        candidate.law.update(1, work.row, candidate.law.theta, work.out);
+        return work.back_stress(work.out);
+    }
+
+    // Make what is along the flow so in the opposite direction.
+    void reverse() const {
+        for (int64_t i = 0; i < work.states; ++i) {
+            if (work.back.weight(i) == 0.0) continue;
+            work.value[1 + i] = -work.value[1 + i];
+            for (int64_t p = 0; p < work.parameters; ++p) work.change[(1 + i) * work.parameters + p] *= -1.0;
+        }
+        work.offset += 2.0 * work.sign * work.value[0];
+        for (int64_t p = 0; p < work.parameters; ++p) work.offset_change[p] += 2.0 * work.sign * work.change[p];
+        work.sign = -work.sign;
+    }
+
     // A segment by the size of a bar's stress, in the direction that it has from its start on.
     Segment turned(const Segment& segment) const {
         const StressControl& drive = test.drive;
         if (!drive.of_bar()) return segment;
-        const double creep = work.offset + work.sign * work.value[0], now = segment.stress - drive.stiffness * creep;
-        const double ahead = fabs(now) > ROUNDING * drive.stiffness * work.value[0] ? now : segment.stress_rate;
-        const double sign = ahead == 0.0 ? work.sign : ahead < 0.0 ? -1.0 : 1.0, turn = work.sign - sign;
-        work.offset += turn * work.value[0];
-        for (int64_t p = 0; p < work.parameters; ++p) work.offset_change[p] += turn * work.change[p];
-        work.sign = sign;
-        return segment.directed(sign * exp(drive.load * work.offset), drive.stiffness * work.offset);
+        const double creep = work.offset + work.sign * work.value[0], growth = exp(drive.load * creep);
+        const double back = work.back_stress(work.value);
+        const double rounding = ROUNDING * (drive.stiffness * work.value[0] + fabs(back));
+        const double now = (segment.stress - drive.stiffness * creep) * growth - work.sign * back;
+        const double ahead = fabs(now) > rounding ? now : segment.stress_rate * growth - work.sign * recovery(segment);
+        if (ahead * work.sign < 0.0) reverse();
+        return segment.directed(work.sign * exp(drive.load * work.offset), drive.stiffness * work.offset);
     }
 
     // Integrate over one segment in its transformed time s, from 0 to 1; the time up to which its stress has one sign.
@@ -169,8 +192,10 @@ private:
                 near = approaching_limit(candidate.limits, work, pace, TERMINATION_MARGIN);
                 steep = work.last_slope(near > 0 ? near : 0);
             }
-            const bool turns = drive.stiffness > 0.0 && drive.of_bar() &&
-                               left(segment, drive, clock, s, h, share) < -ROUNDING * drive.stiffness * work.new_value[0];
+            const double rounding =
+                ROUNDING * (drive.stiffness * work.new_value[0] + fabs(work.back_stress(work.new_value)));
+            const bool turns = drive.of_bar() && (drive.stiffness > 0.0 || work.back.any()) &&
+                               left(segment, drive, clock, s, h, share) < -rounding;
             if (turns) {
                 share = turning(segment, drive, clock, s, h, share);
                 code = REACHED_END;
@@ -203,7 +228,7 @@ private:
     double attempt(const Segment& segment, const StressControl& drive, const SegmentClock& clock, double s, double h,
                    double slope, double first, const AcceptedStep& before) const {
         // Under prescribed strain the stress counts as well: there Newton's tolerance alone decides.
-        const double negligible = drive.stiffness > 0.0 ? 0.0 : work.value[0] + settings.smallest;
+        const double negligible = drive.stiffness > 0.0 && !work.back.any() ? 0.0 : work.value[0] + settings.smallest;
         const StepStart start = {slope, before.length, newton_tolerance(settings),
                                  NEGLIGIBLE_STAGE_ERROR * smaller(LOOSEST_STAGES, settings.rtol) * negligible};
         if (advance(candidate.law, drive, segment, clock, tableau, predictor, work, s, h, start) != SOLVED) {
@@ -229,10 +254,15 @@ private:
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = work.new_change[k];
     }
 
-    // What is left of a bar's stress at the share x of the step, MPa, below zero where it has another sign.
+    // What is left of a bar's (effective) stress at the share x of the step, MPa, below zero where it has another sign.
     double left(const Segment& segment, const StressControl& drive, const SegmentClock& clock, double s, double h,
                 double x) const {
-        return segment.stress_at(clock.at(s + x * h).time) - drive.stiffness * work.dense(tableau, h, 0).at(x);
+        const double creep = work.dense(tableau, h, 0).at(x);
+        double stress = segment.stress_at(clock.at(s + x * h).time) - drive.stiffness * creep;
+        if (!work.back.any()) return stress;
+        if (drive.load != 0.0) stress *= exp(drive.load * creep);
+        for (int64_t i = 0; i < work.states; ++i) stress -= work.back.weight(i) * work.dense(tableau, h, 1 + i).at(x);
+        return stress;
     }
 
     // The share of the step, `high` at most, at which nothing is left of it.
@@ -282,7 +312,9 @@ private:
             record.strain[progress.done] = work.offset + work.sign * strain.at(x);
             if (record.path) record.path[progress.done] = strain.at(x);
             for (int64_t v = 1; record.values && v < work.unknowns(); ++v) {
-                record.values[progress.done * (work.unknowns() - 1) + v - 1] = work.dense(tableau, h, v).at(x);
+                const double value = work.dense(tableau, h, v).at(x);
+                const bool along = work.back.weight(v - 1) != 0.0;
+                record.values[progress.done * work.states + v - 1] = along ? work.sign * value : value;
             }
             if (record.jacobian) {
                 double* change = record.jacobian + progress.done * work.parameters;

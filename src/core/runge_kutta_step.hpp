@@ -89,12 +89,14 @@ struct LawCall {
 // gradient, matrix, response : for differentiate_stage
 // clock_change          : (2, P) of beta and tau
 // nudged, nudged_value  : (P,), (V,) for differences
+// back                  : which states are back stresses, components along the flow, as is the stress of a bar then
 struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
     double *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
     double *clock_change, *nudged, *nudged_value, *offset_change;
     double sign = 1.0, offset = 0.0;
+    BackStresses back;
     TimeAndPace* times;
     StageProblem* problems;
 
@@ -125,6 +127,11 @@ struct StepWorkspace {
     }
 
     int64_t unknowns() const { return 1 + states; }
+    double back_stress(const double* values) const { return back.sum(values + 1, states); }
+    double effective_stress(const Tableau& tableau, double h) const {  // at the end of a step
+        const double increment = tableau.diagonal(stages - 1) * h * last_slope(0);
+        return problems[stages - 1].effective_stress(increment, new_value + 1, states);
+    }
     double last_slope(int64_t v) const { return slopes[(stages - 1) * unknowns() + v]; }
     DenseOutput dense(const Tableau& tableau, double h, int64_t v) const {
         return DenseOutput(tableau, value[v], h, slopes + v, unknowns());
@@ -146,12 +153,14 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     const TimeAndPace now = clock.at(s + tableau.c[i] * h);
     const double elapsed = now.time - segment.start, strain = base[0] > 0.0 ? base[0] : 0.0;
     const double left = segment.stress + segment.stress_rate * elapsed - drive.stiffness * strain;
-    const double driving = drive.of_bar() ? larger(0.0, left) : left;  // below zero by rounding, or about to turn
+    const bool clipped = drive.of_bar() && !work.back.any();  // below zero by rounding, or about to turn
+    const double driving = clipped ? larger(0.0, left) : left;
     work.times[i] = now;
     work.row[TIME] = now.time;
     work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * elapsed;
     const double trial = drive.load != 0.0 ? driving * exp(drive.load * strain) : driving;
-    return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain};
+    return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain,
+                               work.back};
 }
 
 // What the stages of a step are guessed from, and how well they are to be solved.
@@ -260,9 +269,10 @@ inline int64_t differentiate(const LawCall& law, const StressControl& drive, con
         law.sensitivity(1, work.row, law.theta, work.full);
         gradient_of_sensitivity(work.full, problem, increment, work.gradient, work.states);
         const double* by_parameter = work.full + size + size * (POINT_SIZE + work.states);
+        const bool flows = stress > problem.back.sum(work.row + POINT_SIZE, work.states);
         for (int64_t v = 0; v < size; ++v) {
             double* response = work.response + v * columns + INPUTS + work.states;
-            const bool moves = stress > 0.0 || v > 0;
+            const bool moves = flows || v > 0;
             for (int64_t p = 0; p < count; ++p) {
                 response[p] = moves ? problem.weight * by_parameter[v * count + p] : 0.0;
             }

@@ -9,6 +9,9 @@
 // in a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant load, -1
 // compression, else 0. The unknown of the iteration is x = ln[D / (1 - k D/trial)]: every x is an increment that leaves some stress.
 //
+// Some states of a bar may be back stresses X: components along the flow, as sigma is there, of what the law takes off
+// the stress. The bar flows while the effective stress sigma - X is above zero, whatever sigma is, and then x = ln D.
+//
 // The derivatives of (D, z) follow from the implicit function theorem; the finite element solver takes its consistent
 // tangent from them, the integration of a point its sensitivities to the parameters.
 //
@@ -43,12 +46,34 @@ constexpr Axes COMPRESSION = {0.0, 0.0, 0.0, -1.0 / 3.0};
 
 inline const Axes& axes_of(double sign) { return sign < 0.0 ? COMPRESSION : UNIAXIAL; }
 
+// Which states are back stresses: weights (S,), 1 of those, 0 of others; null where none is.
+struct BackStresses {
+    const double* weights = nullptr;
+
+    bool any() const { return weights != nullptr; }
+    double weight(int64_t state) const { return weights ? weights[state] : 0.0; }
+
+    // Their sum among the states z (S,), MPa.
+    double sum(const double* z, int64_t states) const {
+        double total = 0.0;
+        for (int64_t i = 0; weights && i < states; ++i) total += weights[i] * z[i];
+        return total;
+    }
+};
+
 // What a stage is solved for: trial stress and k in MPa, load 0, 1 or -1, weight w in s, strain p0 so far.
 struct StageProblem {
     double trial, stiffness, load, weight, strain;
+    BackStresses back = {};
+
+    // The effective stress after the increment D, with the states z, MPa.
+    double effective_stress(double increment, const double* z, int64_t states) const {
+        const double left = trial - stiffness * increment;
+        return (load != 0.0 ? left * exp(load * increment) : left) - back.sum(z, states);
+    }
 };
 
-// An iterate x in plain terms: D, ln D, stress in MPa, and d(ln D)/dx, d(ln sigma)/dx.
+// An iterate x in plain terms: D, ln D, stress in MPa, and d(ln D)/dx, d(sigma)/dx.
 struct StageIterate {
     double increment, log_increment, stress, increment_slope, stress_slope;
 };
@@ -56,19 +81,23 @@ struct StageIterate {
 // Turn the unknown x into increment and stress.
 inline StageIterate increment_and_stress(const StageProblem& problem, double x) {
     const double amount = exp(x < 700.0 ? x : 700.0);
+    if (problem.stiffness > 0.0 && problem.back.any()) {
+        return {amount, x, problem.trial - problem.stiffness * amount, 1.0, -problem.stiffness * amount};
+    }
     if (problem.stiffness > 0.0) {
         const double ratio = problem.stiffness * amount / problem.trial, elastic = 1.0 / (1.0 + ratio);
-        return {amount * elastic, x - log1p(ratio), problem.trial * elastic, elastic, elastic - 1.0};
+        const double stress = problem.trial * elastic;
+        return {amount * elastic, x - log1p(ratio), stress, elastic, stress * (elastic - 1.0)};
     }
     const double stress =
         problem.load != 0.0 ? problem.trial * exp(problem.load * (amount < 700.0 ? amount : 700.0)) : problem.trial;
-    return {amount, x, stress, 1.0, problem.load * amount};
+    return {amount, x, stress, 1.0, stress * (problem.load * amount)};
 }
 
 // The unknown x of a guessed increment, kept off the ends of its range.
 inline double unknown_of_increment(const StageProblem& problem, double increment) {
     const double guess = increment > 1e-300 ? increment : 1e-300;
-    if (problem.stiffness == 0.0) return log(guess);
+    if (problem.stiffness == 0.0 || problem.back.any()) return log(guess);
     const double share = problem.stiffness * guess / problem.trial;
     return share < 0.999 ? log(guess) - log1p(-share) : log(999.0 * problem.trial / problem.stiffness);
 }

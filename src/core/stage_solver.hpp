@@ -57,7 +57,7 @@ inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, co
         if (!isfinite(residual) && !nothing) return {0.0, NOT_FINITE};
         // d(ln D - ln w - ln f)/dx: between 1 and the stress exponent for a hardening law under prescribed strain
         const double by_strain = nothing ? 0.0 : now.increment * now.increment_slope * out[1 + STRAIN];
-        const double by_stress = nothing ? 0.0 : now.stress * now.stress_slope * stress_derivative(out, 1, axes);
+        const double by_stress = nothing ? 0.0 : now.stress_slope * stress_derivative(out, 1, axes);
         const double slope = nothing ? 1.0 : now.increment_slope - by_strain - by_stress;
         (residual > 0.0 ? high : low) = x;
         const bool closed = isfinite(low) && isfinite(high);
@@ -106,7 +106,7 @@ inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta
         const double by_stress = stress * stress_slope * stress_derivative(out, 1, axes);
         const double slope = elastic - by_strain - by_stress, step = -residual / slope;
         if (!(slope > 0.0 && fabs(step) < 1.0)) break;
-        const StageIterate now = {increment, 0.0, stress, elastic, stress_slope};
+        const StageIterate now = {increment, 0.0, stress, elastic, stress * stress_slope};
         const double left = increment * error_left(now, problem, by_strain, by_stress, slope, step);
         const bool enough = fabs(step) <= tolerance || (fabs(step) < SMALL && left < negligible);
         if (relaxes) {
@@ -137,7 +137,7 @@ inline void stage_newton_system(const Axes& axes, const StageProblem& problem, c
         const int64_t start = size + i * width;
         const double factor = i > 0 ? problem.weight : creeps ? 1.0 : 0.0;
         const double by_strain = now.increment * now.increment_slope * out[start + STRAIN];
-        const double by_stress = now.stress * now.stress_slope * stress_derivative(out, start, axes);
+        const double by_stress = now.stress_slope * stress_derivative(out, start, axes);
         matrix[i * size] = creeps ? -factor * (by_strain + by_stress) : 0.0;
         for (int64_t j = 1; j < size; ++j) {
             matrix[i * size + j] = factor > 0.0 ? -factor * out[start + POINT_SIZE + j - 1] : 0.0;
@@ -194,10 +194,100 @@ inline StageSolution solve_stage_with_states(LawEntry update, const double* thet
     return {0.0, TOO_MANY};
 }
 
+constexpr double NO_STRESS_LEFT = 1e-13;  // of a back stress: an effective stress below it is rounding
+
+// Whether an increment D leaves a bar some effective stress, with the states in a law's `row`.
+inline bool leaves_stress(const StageProblem& problem, double increment, const double* row, int64_t state_count) {
+    const double* z = row + POINT_SIZE;
+    const double rounding = NO_STRESS_LEFT * fabs(problem.back.sum(z, state_count));
+    return problem.effective_stress(increment, z, state_count) > rounding;
+}
+
+// ln of an increment, the guess or less, that leaves some; NaN where none does.
+inline double unknown_that_leaves_stress(const StageProblem& problem, double guess, const double* row,
+                                         int64_t state_count) {
+    if (!leaves_stress(problem, 0.0, row, state_count)) return NAN;
+    double x = unknown_of_increment(problem, fmin(guess, 1.0));
+    while (!leaves_stress(problem, exp(x), row, state_count)) x -= 1.0;
+    return x;
+}
+
+// The share, `most` at most, of a correction of (ln D, z) that leaves a tenth of the effective stress.
+inline double share_that_leaves_stress(const StageProblem& problem, double x, const double* step, const double* row,
+                                       int64_t state_count, double most) {
+    constexpr double LEAST_LEFT = 0.1, LEAST_SHARE = 1e-18;
+    const double *z = row + POINT_SIZE, least = LEAST_LEFT * problem.effective_stress(exp(x), z, state_count);
+    double moved[MAX_STATES], share = most;
+    for (; share > LEAST_SHARE; share *= 0.5) {
+        for (int64_t i = 0; i < state_count; ++i) moved[i] = z[i] + share * step[1 + i];
+        if (problem.effective_stress(exp(x + share * step[0]), moved, state_count) >= least) break;
+    }
+    return share;
+}
+
+// Damped Newton's method in (ln D, z) for a bar with a back stress, which flows while some effective stress is left.
+//
+// Where none is, the states move alone, and what they then leave may flow. negligible : error of D that need not be
+// removed, for an effective stress far below the back stress has few digits.
+inline StageSolution solve_stage_with_back_stress(LawEntry update, const double* theta, const Axes& axes,
+                                                  const StageProblem& problem, const double* states,
+                                                  int64_t state_count, double* row, double* out, double guess,
+                                                  double tolerance, double negligible) {
+    constexpr int ITERATIONS = 100;
+    constexpr double LONGEST_CORRECTION = 5.0, SMALL = 0.3;
+    if (state_count > MAX_STATES) return {0.0, NO_SOLUTION};
+    const int64_t size = 1 + state_count;
+    double matrix[(1 + MAX_STATES) * (1 + MAX_STATES)], step[1 + MAX_STATES];
+    double x = unknown_that_leaves_stress(problem, guess, row, state_count);
+    bool flowed = !isnan(x);
+    for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+        const bool flows = !isnan(x);
+        const StageIterate now =
+            flows ? increment_and_stress(problem, x) : StageIterate{0.0, 0.0, problem.trial, 0.0, 0.0};
+        write_point(row, axes, now.stress, problem.strain + now.increment);
+        update(1, row, theta, out);
+        if (flows && out[0] < NO_RATE) {
+            x = NAN;
+            continue;
+        }
+        stage_newton_system(axes, problem, states, state_count, row, out, now, flows, matrix, step);
+        if (!solve_dense(matrix, step, size, 1)) return {0.0, NO_SOLUTION};
+        double share = fmin(1.0, LONGEST_CORRECTION / fmax(fabs(step[0]), 1e-300));
+        if (flows) share = share_that_leaves_stress(problem, x, step, row, state_count, share);
+        bool small = !(fabs(step[0]) > tolerance) ||
+                     (fabs(step[0]) < SMALL && now.increment * fabs(step[0]) < negligible);
+        double sum = 0.0;
+        for (int64_t i = 1; i < size; ++i) {
+            double& z = row[POINT_SIZE + i - 1];
+            z += share * step[i];
+            sum += z;
+            small = small && !(fabs(step[i]) > tolerance * fmax(fabs(z), 1e-12));
+        }
+        if (!isfinite(sum + step[0])) return {0.0, NOT_FINITE};
+        x += share * step[0];
+        if (flows && !leaves_stress(problem, exp(x), row, state_count)) {
+            x = NAN;
+            continue;
+        }
+        if (!small) continue;
+        const double increment = flows ? exp(x) : 0.0;
+        write_point(row, axes, problem.effective_stress(increment, row, 0), problem.strain + increment);
+        if (flows || out[0] < NO_RATE || !leaves_stress(problem, 0.0, row, state_count)) return {increment, SOLVED};
+        if (flowed) return {0.0, NO_SOLUTION};
+        flowed = true;
+        x = unknown_that_leaves_stress(problem, guess, row, state_count);
+    }
+    return {0.0, TOO_MANY};
+}
+
 // Solve a stage.
 inline StageSolution solve_stage(LawEntry update, const double* theta, const Axes& axes, const StageProblem& problem,
                                  const double* states, int64_t state_count, double* row, double* out, double guess,
                                  double tolerance, double negligible = 0.0) {
+    if (problem.back.any()) {
+        return solve_stage_with_back_stress(update, theta, axes, problem, states, state_count, row, out, guess,
+                                            tolerance, negligible);
+    }
     if (state_count > 0) {
         return solve_stage_with_states(update, theta, axes, problem, states, state_count, row, out, guess, tolerance);
     }

@@ -37,7 +37,8 @@ inline double newton_tolerance(const IntegrationSettings& settings) {
 
 // Largest local error of the step and of its dense output over what is allowed.
 //
-// Infinite when creep strain falls, which it never does. Under prescribed strain the stress counts as well.
+// Infinite when creep strain falls, which it never does. Under prescribed strain the stress counts as well. The error of
+// a back stress is relative to it and to the effective stress.
 // ahead : the first output's position over that of the step's end: until then only the strain there matters.
 // slope : dp/ds at the start of the step, NaN when not known; with it, Hermite's cubic checks the dense output.
 inline double strain_error(const Tableau& tableau, const StressControl& drive, const Segment& segment,
@@ -47,7 +48,7 @@ inline double strain_error(const Tableau& tableau, const StressControl& drive, c
     double reach = work.new_value[0] * ahead;
     if (drive.stiffness > 0.0) {
         const double stress = segment.end_stress - drive.stiffness * work.new_value[0];
-        reach = smaller(reach, fabs(stress) / drive.stiffness);
+        reach = smaller(reach, (fabs(stress) + fabs(work.back_stress(work.new_value))) / drive.stiffness);
     }
     double worst = local_error(tableau, work, h, 0);
     if (!isnan(slope)) {
@@ -57,8 +58,10 @@ inline double strain_error(const Tableau& tableau, const StressControl& drive, c
         worst = worse(worst, off);
     }
     worst /= settings.rtol * (reach + settings.smallest);
+    const double effective = work.back.any() ? fabs(work.effective_stress(tableau, h)) : 0.0;
     for (int64_t v = 1; v < work.unknowns(); ++v) {
-        const double state = larger(fabs(work.value[v]), fabs(work.new_value[v])) + settings.smallest;
+        double state = larger(fabs(work.value[v]), fabs(work.new_value[v])) + settings.smallest;
+        state += effective * work.back.weight(v - 1);
         worst = worse(worst, local_error(tableau, work, h, v) / (settings.rtol * state));
     }
     return isfinite(worst) ? worst : INFINITY;
@@ -156,18 +159,21 @@ struct CurveBend {
 };
 
 // row, out : input and output of the law's update where the segment begins; rate : exp(out[0]).
-inline CurveBend curve_bend(const StressControl& drive, const Segment& segment, double stress, double rate,
+inline CurveBend curve_bend(const StressControl& drive, const Segment& segment, const BackStresses& back, double rate,
                             const double* row, const double* out, int64_t size) {
     const double by_stress = stress_derivative(out, size, drive.axes);
     const double strain = row[STRAIN], time = row[TIME], aging = out[size + TIME];
     const double hardening = strain > 0.0 ? rate * out[size + STRAIN] : 0.0;
-    const double thinning = rate * drive.load * stress * by_stress;
-    const double relaxing = -rate * drive.stiffness * by_stress;
+    const double thinning = rate * drive.load * row[STRESS] * by_stress;
+    const double effective = row[STRESS] - back.sum(row + POINT_SIZE, size - 1);
+    const double fall = drive.stiffness * rate + back.sum(out + 1, size - 1), relaxing = -fall * by_stress;
     double driven = by_stress * segment.stress_rate * exp(drive.load * strain);
     driven += out[size + TEMPERATURE] * segment.temperature_rate;
-    for (int64_t v = 1; v < size; ++v) driven += out[size + POINT_SIZE + v - 1] * out[v];
+    for (int64_t v = 1; v < size; ++v) {
+        if (back.weight(v - 1) == 0.0) driven += out[size + POINT_SIZE + v - 1] * out[v];
+    }
     const double bend = aging + hardening + thinning + relaxing + driven;
-    double bend_rate = thinning * bend + relaxing * (bend + drive.stiffness * rate / stress);
+    double bend_rate = thinning * bend + relaxing * (bend + fall / effective);
     if (time > 0.0) bend_rate -= aging / time;
     if (strain > 0.0) bend_rate += hardening * (bend - rate / strain);
     return {bend, bend_rate};
@@ -180,7 +186,7 @@ inline SegmentStart choose_time_transformation(LawEntry update, const double* th
     const double length = segment.end - segment.start, strain = value[0];
     if (strain < ZERO_STRAIN && beta < 1.0) return {power_law_time(segment.start, length, beta), 0.0};
     const double stress = (segment.stress - drive.stiffness * strain) * exp(drive.load * strain);
-    if (!(stress > 0.0)) return {linear_time(segment.start, length), 0.0};
+    if (!(stress - work.back_stress(value) > 0.0)) return {linear_time(segment.start, length), 0.0};
     double *row = work.row, *out = work.out;
     row[TIME] = segment.start;
     row[TEMPERATURE] = segment.temperature;
@@ -189,7 +195,7 @@ inline SegmentStart choose_time_transformation(LawEntry update, const double* th
     update(1, row, theta, out);
     const double rate = exp(smaller(600.0, out[0]));
     if (isnan(out[0]) || !(rate > 0.0)) return {linear_time(segment.start, length), 0.0};
-    const CurveBend curve = curve_bend(drive, segment, stress, rate, row, out, work.unknowns());
+    const CurveBend curve = curve_bend(drive, segment, work.back, rate, row, out, work.unknowns());
     return {shifted_power_law_time(segment.start, length, curve.bend, curve.rate), rate};
 }
 

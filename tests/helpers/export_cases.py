@@ -78,7 +78,7 @@ MULTIAXIAL = CreepLaw(
 """The rate and the growth feel all three stresses about equally."""
 
 LAWS: dict[str, CreepLaw] = {
-    **{f"registered {name}": law for name, law in registered_laws().items()},
+    **{f"registered {name}": law for name, law in registered_laws().items() if not law.back_stresses},
     **{f"foreign {name}": law for name, law in EQUATIONS.items()},
     "pieces": PIECES,
     "multiaxial": MULTIAXIAL,
@@ -91,7 +91,7 @@ LAWS: dict[str, CreepLaw] = {
     "Kachanov with temperature": EQUATIONS["Kachanov-Rabotnov"].times(arrhenius()),
     "Liu-Murakami and more": EQUATIONS["Liu-Murakami"] + STRAIN_HARDENING,
 }
-"""{name: law}: all that are installed, laws as others would write them, sums, laws with temperature and states."""
+"""{name: law}: laws of programs, installed and as others would write them, sums, laws with temperature and states."""
 
 
 @dataclass(frozen=True)

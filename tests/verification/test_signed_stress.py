@@ -128,17 +128,12 @@ def integrated(law, values, program, kind):
         return [np.sign(sigma) * rate, rate, *growth]
 
     y, found = np.array([0.0, 1e-16, *(s.initial for s in law.states.values())]), {}
-    for (begin, low), (end, high) in pairwise(zip(program.times, program.values, strict=True)):
+    knots = [*zip(program.times, program.values, strict=True), (max(TIMES) + 1.0, program.values[-1])]
+    for (begin, low), (end, high) in pairwise(knots):
         marks = sorted({t for t in TIMES if begin < t <= end} | {end})
         piece = solve_ivp(slope, (begin, end), y, "Radau", marks, args=(begin, end, low, high), rtol=1e-10, atol=1e-16)
         found |= dict(zip(piece.t, piece.y.T, strict=True))
         y = piece.y[:, -1]
-    if max(TIMES) not in found:
-        begin, level = float(program.times[-1]), float(program.values[-1])
-        span = (begin, max(TIMES))
-        marks = [t for t in TIMES if t > begin]
-        piece = solve_ivp(slope, span, y, "Radau", marks, args=(*span, level, level), rtol=1e-10, atol=1e-16)
-        found |= dict(zip(piece.t, piece.y.T, strict=True))
     rows = np.array([found[t] for t in TIMES]).T
     return rows[0], rows[1], rows[2:]
 

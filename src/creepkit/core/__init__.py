@@ -23,7 +23,7 @@ from creepkit.errors import CreepkitError
 LIBRARY_NAMES = {"darwin": "libcreepkit_core.dylib", "win32": "creepkit_core.dll"}
 
 
-INTERFACE_VERSION = 10
+INTERFACE_VERSION = 11
 """What `creepkit_core_version` of the library must return; both change when a function or its arguments do."""
 
 REMEDY = "run 'make core' in a clone of the sources, or install creepkit again"

@@ -15,7 +15,7 @@ from typing import ClassVar, Literal
 import sympy
 
 from creepkit.errors import ExportError
-from creepkit.exporters.law_description import comment_lines, heading, refuse_conditions
+from creepkit.exporters.law_description import comment_lines, heading, refuse_back_stress, refuse_conditions
 from creepkit.exporters.unit_conversion import reference_sentence
 from creepkit.kernels.log_form import in_one_sentence
 from creepkit.language.elastic import Elastic
@@ -87,6 +87,7 @@ def creep_forms_of(source: LawWithValues, target: str, alternative: str) -> tupl
     """
     source = source.without_inactive_terms()
     law = source.law
+    refuse_back_stress(law)
     refuse_conditions(law, target)
     if law.states:
         state_names = ", ".join(f"'{s}'" for s in law.states)

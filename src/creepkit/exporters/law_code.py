@@ -16,6 +16,7 @@ from functools import lru_cache
 import sympy
 
 from creepkit.errors import SAID, ExportError, LawError, restated
+from creepkit.exporters.law_description import refuse_back_stress
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
 from creepkit.language.symbols import POINT_VARIABLES
@@ -129,6 +130,7 @@ class LawCode:
         """
         self.source = source if keeps_inactive else source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
+        refuse_back_stress(self.law)
         with restated(LawError, ExportError, f"cannot be written as a program: {SAID}"):
             self._lowered: SymbolicKernel = _kernel_entries(self.law)
         self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}

@@ -51,6 +51,15 @@ def refuse_conditions(law: CreepLaw, target: str) -> None:
         )
 
 
+def refuse_back_stress(law: CreepLaw) -> None:
+    """ExportError, with what to do, where a law has a back stress: programs have a scalar for a state."""
+    if law.back_stresses:
+        raise ExportError(
+            f"law '{law.name}' has a back stress, whose direction programs do not follow; export it as 'latex', "
+            "'markdown' or 'mathml', or a law without one"
+        )
+
+
 def units_sentence(source: LawWithValues) -> str:
     """The units of a text that converts stress and time on entry, and rates on exit."""
     sentence = f"Stress in {source.units.stress}, time in {source.units.time}, rates in 1/{source.units.time}"

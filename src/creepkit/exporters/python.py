@@ -18,7 +18,7 @@ import sympy
 
 from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.exporters.law_code import Identifiers, factor_text
-from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.exporters.law_description import comment_lines, heading, printable_text, refuse_back_stress
 from creepkit.exporters.unit_conversion import STRESSES
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter, joined
@@ -71,6 +71,7 @@ class _ModuleFunctions:
 
     def __init__(self, source: LawWithValues, dialect: PythonDialect) -> None:
         self.source, self.law, self.dialect = source, source.law, dialect
+        refuse_back_stress(self.law)
         form = log_form(self.law)
         self._identifiers = Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_MODULE_NAMES))
         symbols = (*POINT_VARIABLES, *self.law.states, *self.law.conditions, *self.law.params)

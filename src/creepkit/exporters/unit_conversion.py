@@ -10,7 +10,7 @@ the parts of an expression, in time proportional to its length; sympy is not ask
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import mpmath
@@ -60,14 +60,15 @@ def reference_sentence(units: Units) -> str:
 def _coefficient_factors(law: CreepLaw, values: Mapping[str, float], units: Units) -> dict[str, float]:
     """{rate coefficient: what it must be multiplied by}."""
     parameter_powers = {symbol: _unit_powers(param.unit) for symbol, param in law.params.items()}
-    of_stress = dict.fromkeys(STRESSES, 1) | {symbol: power for symbol, (power, _) in parameter_powers.items()}
+    stresses = (*STRESSES, *law.back_stresses)
+    of_stress = dict.fromkeys(stresses, 1) | {symbol: power for symbol, (power, _) in parameter_powers.items()}
     of_time = {time: 1} | {symbol: power for symbol, (_, power) in parameter_powers.items()}
     numbers = {symbol: values[symbol.name] for symbol in law.params}
     candidates = [s for s, param in law.params.items() if param.scale == "log" and values[s.name] > 0]
-    rates = {f"term '{label}'": term for label, term in law.terms.items()}
-    rates |= {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
+    rates = [(f"term '{label}'", term) for label, term in law.terms.items()]
+    rates += [(f"rate of '{symbol}'", rate) for symbol, rate in _rates_of_states(law)]
     factors: dict[str, float] = {}
-    for label, rate in rates.items():
+    for label, rate in rates:
         p, q = (_degree_in_numbers(rate, degrees, numbers) for degrees in (of_stress, of_time))
         factor = None
         if p is not None and q is not None:
@@ -88,6 +89,15 @@ def _coefficient_factors(law: CreepLaw, values: Mapping[str, float], units: Unit
             continue
         raise ExportError(f"{problem}; export it in MPa and s")
     return factors
+
+
+def _rates_of_states(law: CreepLaw) -> Iterator[tuple[sympy.Symbol, sympy.Expr]]:
+    """Each state with its rate; a back stress, whose unit is that of stress, with each summand over the stress."""
+    for symbol, state in law.states.items():
+        if symbol in law.back_stresses:
+            yield from ((symbol, part / stress) for part in sympy.Add.make_args(state.rate))
+        else:
+            yield symbol, state.rate
 
 
 def _degree_in_numbers(
@@ -158,11 +168,12 @@ def coefficient_unit(law: CreepLaw, name: str) -> str:
     that depends on temperature.
     """
     symbol = next(one for one in law.params if one.name == name)
-    rates = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    rates = [*law.terms.values(), *(rate for _, rate in _rates_of_states(law))]
     rates = [rate for rate in rates if symbol in rate_coefficients(law, rate)]
     if law.params[symbol].unit != "1/s" or not rates or any(rate.has(sympy.Max, sympy.Min) for rate in rates):
         return ""
-    powers = {(_power(law, rate, STRESSES, "MPa"), _power(law, rate, (time,), "s")) for rate in rates}
+    stresses = (*STRESSES, *law.back_stresses)
+    powers = {(_power(law, rate, stresses, "MPa"), _power(law, rate, (time,), "s")) for rate in rates}
     of_stress, of_time = powers.pop()
     if powers or of_stress is None or of_time is None or of_stress == of_time == 0:
         return ""

@@ -13,7 +13,7 @@ from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel, SensitivityDirections
 from creepkit.fem.reduced_order_model import ReducedOrderModel
-from creepkit.integration.core_structures import MAX_STATES
+from creepkit.integration.core_structures import refusal
 from creepkit.kernels.interface import CompiledEntry, CompiledLaw
 
 (
@@ -96,8 +96,8 @@ def solve(
 ) -> StepRecord:
     """Simulate a body; theta : (P,) internal parameters. directions : None for no derivatives."""
     theta = _contiguous(theta)
-    if law.states > MAX_STATES:
-        raise SolveError(f"the law has {law.states} internal variables; finite elements take up to {MAX_STATES}")
+    if sentence := refusal(law, theta):
+        raise SolveError(sentence)
     segments = _contiguous(program.segments)
     rows, points = settings.max_steps + len(segments) + 2, model.point_count
     initial, limits, script = (_contiguous(a) for a in (law.initial, law.limits, program.script))

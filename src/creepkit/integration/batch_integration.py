@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats, Ints, frozen
-from creepkit.core import function
+from creepkit.core import address, function
 from creepkit.errors import SolveError
 from creepkit.integration.core_structures import (
     STATUS,
@@ -132,7 +132,7 @@ def integrate(
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     if theta.ndim > 2 and theta.shape[1:-1] != (len(tests),):
         raise SolveError(f"parameters of shape {theta.shape} are not (candidates, {len(tests)} tests, parameters)")
-    if sentence := refusal(law, theta):
+    if sentence := refusal(law, theta, of_bar=axes == UNIAXIAL):
         raise SolveError(sentence)
     result, inputs = _unfilled(theta, tests, jacobian), _inputs(law, theta, tests)
     if keep_states:
@@ -151,6 +151,8 @@ def integrate(
         tableau=tableau_structure(tableau),
     )
     write_addresses(batch, {**inputs, **result})
+    if law.back_stresses.any():
+        batch.back_stresses = address(law.back_stresses)
     call = function("creepkit_integrate_batch")
     if theta.ndim == 2:
         check_call(call(ctypes.byref(batch)))

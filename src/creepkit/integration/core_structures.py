@@ -38,6 +38,12 @@ STATUS[REACHED_END] = Status.COMPLETE
 STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
 
 
+BACK_STRESS_OF_BARS = (
+    "the law has a back stress, whose direction bars alone follow: use the specimen uniaxial or relaxation, or a law "
+    "without one"
+)
+
+
 MAX_STATES = 16
 """Internal variables of a law, at most."""
 
@@ -104,7 +110,8 @@ class BatchStructure(ctypes.Structure):
     _fields_ = [
         *((name, _POINTER) for name in ("update", "sensitivity")),
         *((name, _COUNT) for name in ("candidates", "tests", "parameters", "states", "with_sensitivities")),
-        *((name, _POINTER) for name in ("theta", "beta", "initial", "limits", "stress_controls")),
+        *((name, _POINTER) for name in ("theta", "beta", "initial", "limits", "back_stresses")),
+        ("stress_controls", _POINTER),
         *((name, _POINTER) for name in ("segments", "segment_offsets", "times", "time_offsets")),
         *((name, _POINTER) for name in ("levels", "level_offsets")),
         ("axes", AxesStructure),
@@ -187,8 +194,13 @@ def write_addresses(structure: ctypes.Structure, arrays: Mapping[str, Floats | I
         setattr(structure, name, address(array))
 
 
-def refusal(law: CompiledLaw, theta: Floats) -> str:
-    """Why the core cannot take a law with internal parameters theta (..., P); nothing when it can."""
+def refusal(law: CompiledLaw, theta: Floats, *, of_bar: bool = False) -> str:
+    """Why the core cannot take a law with internal parameters theta (..., P); nothing when it can.
+
+    of_bar : whether it is for a bar, which alone follows a back stress.
+    """
+    if law.back_stresses.any() and not of_bar:
+        return BACK_STRESS_OF_BARS
     if law.states > MAX_STATES:
         return f"a law may have {MAX_STATES} internal variables, but this one has {law.states}"
     if theta.shape[-1] != len(law.names):

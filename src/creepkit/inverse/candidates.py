@@ -24,7 +24,12 @@ from creepkit.inverse.reference_conditions import (
     reference_temperature,
 )
 from creepkit.language import CreepLaw
-from creepkit.quality.curve_shapes import falls_logarithmically, shows_primary_creep, shows_tertiary_creep
+from creepkit.quality.curve_shapes import (
+    falls_logarithmically,
+    shows_primary_creep,
+    shows_recovery,
+    shows_tertiary_creep,
+)
 from creepkit.records import History, growing_output, is_logarithmic
 from creepkit.registry import default_registry
 
@@ -58,7 +63,8 @@ def candidates(histories: Sequence[History]) -> list[CreepLaw]:
     an activation energy; with primary creep where a third of the curves show it, with and without where a third relax,
     and logarithmic creep where a third of them go with ln t, else beside hardening by strain and by time. Where a third
     of the curves show tertiary creep, more than loss of section under a constant load explains, or where a table states
-    rupture times, laws with damage are added.
+    rupture times, laws with damage are added; where a bar is reversed, or creeps backwards once its stress has fallen,
+    one with a back stress.
     """
     return list(named_candidates(histories).values())
 
@@ -83,6 +89,7 @@ def named_candidates(histories: Sequence[History]) -> dict[str, CreepLaw]:
         names = [*(f"{name}*primary" for name in steady), "strain-hardening", "time-hardening", *exhaustion]
     else:
         names = ["norton", "strain-hardening", "time-hardening", *steady[1:]]
+    names += ["armstrong-frederick"] * any(map(_remembers_direction, curves))
     named = {name: law for name in names if (law := _law(name)) is not None}
     laws = list(named.values())
     kept = [law.fingerprint for law in testable_laws(laws, tests) or laws[:1]]
@@ -187,6 +194,14 @@ def _stresses(history: History) -> list[float]:
 def _relaxes(history: History) -> bool:
     """Whether strain is held: such a curve does not show whether its first fall is primary creep."""
     return history.loading.quantity == "strain"
+
+
+def _remembers_direction(history: History) -> bool:
+    """Whether a bar is reversed, or recovers: what a law without a back stress does not tell from other loads."""
+    if history.loading.quantity not in {"stress", "strain"}:
+        return False
+    values = history.loading.program().values
+    return bool(values.min() < 0.0 < values.max()) or shows_recovery(history)
 
 
 def _share(tests: Sequence[History], shows: Callable[[History], bool]) -> float:

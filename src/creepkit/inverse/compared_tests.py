@@ -127,9 +127,19 @@ def rests_on_durations(law: CreepLaw, histories: Sequence[History]) -> bool:
 
 
 def testable_laws(laws: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:
-    """The laws that tests can judge: those whose rate needs no durations, or none that are unknown or untested."""
-    known = all(map(duration_known, histories))
+    """The laws that tests can judge: those whose rate needs no durations, or none that are unknown or untested.
+
+    A back stress is told from hardening where the load of a bar falls or turns.
+    """
+    known, falls = all(map(duration_known, histories)), any(map(load_falls, histories))
+    laws = [law for law in laws if falls or not law.back_stresses]
     return [law for law in laws if (known or not needs_durations(law)) and not rests_on_durations(law, histories)]
+
+
+def load_falls(history: History) -> bool:
+    """Whether the stress or the strain that a bar is given falls within its test."""
+    loading = history.loading
+    return loading.quantity in {"stress", "strain"} and bool((np.diff(loading.program().values) < 0.0).any())
 
 
 def compares_rupture_times(law: CreepLaw, settings: IdentificationSettings) -> bool:

@@ -280,13 +280,13 @@ def _accelerations(law: CreepLaw) -> list[sympy.Symbol]:
 
 
 def _state_rate_laws(law: CreepLaw) -> list[tuple[State, CreepLaw]]:
-    """Internal variables, each with a law whose rate is how fast that one moves; none where that has no logarithm.
+    """Scalar internal variables, each with a law whose rate is how fast it moves; none where that has no logarithm.
 
     Only the coefficient's coordinate depends on it: without it, the coefficient is a coordinate itself.
     """
     rate_laws, rate_parameters = [], {p for state in law.states.values() for p in state.rate.free_symbols}
     state_parameters = {p: param for p, param in law.params.items() if p in rate_parameters}
-    for symbol, state in law.states.items():
+    for symbol, state in ((s, z) for s, z in law.states.items() if s not in law.back_stresses):
         term_name = f"rate of {symbol}"
         signed_rate_laws = (
             replace(law, terms={term_name: sign * state.rate}, params=state_parameters, constraints=())

@@ -187,6 +187,7 @@ def compile_law(law: CreepLaw) -> CompiledLaw:
         names=law.names,
         initial=initial,
         limits=frozen([np.inf if state.limit is None else state.limit for state in law.states.values()]),
+        back_stresses=frozen([float(symbol in law.back_stresses) for symbol in law.states]),
         leading_exponent=partial(_leading_exponent, module, (*_REFERENCE_POINT, *initial)),
         source=module.SOURCE,
         fingerprint=key,

@@ -51,6 +51,7 @@ class CompiledLaw:
     rate, update, sensitivity : entries.
     names : of the P parameters, in the order of theta.
     initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
+    back_stresses : (S,) 1 of states that are back stresses, else 0.
     leading_exponent : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
         virgin state at constant stress, (...,). Where an exponent varies with the point, a second argument
         (..., 6 + S) says which; else it is taken at 100 MPa and 1000 K.
@@ -62,6 +63,7 @@ class CompiledLaw:
     names: tuple[str, ...]
     initial: Floats
     limits: Floats
+    back_stresses: Floats
     leading_exponent: Callable[..., Floats]
     source: str
     fingerprint: str

@@ -14,7 +14,7 @@ from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.language.expression_trees import condition_from_tree, expression_from_tree, expression_to_tree
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, ParameterScale, State, Symbol
+from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, ParameterScale, State, StateKind, Symbol
 from creepkit.limits import numbers
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
@@ -66,6 +66,7 @@ class StateDocument:
     initial: float
     rate: Any
     limit: float | None
+    kind: StateKind = "scalar"
 
 
 @dataclass(frozen=True)

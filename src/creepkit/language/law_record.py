@@ -22,7 +22,16 @@ from sympy.logic.boolalg import Boolean, BooleanAtom
 
 from creepkit.errors import POWER_REMEDY, LawError, nearest, quoted
 from creepkit.language.expression_trees import evaluate_multiprecision
-from creepkit.language.symbols import POINT_VARIABLES, ConditionSymbol, Param, State, SymbolTuple
+from creepkit.language.symbols import (
+    POINT_VARIABLES,
+    ConditionSymbol,
+    Param,
+    State,
+    SymbolTuple,
+    mean_stress,
+    principal_stress,
+    stress,
+)
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike, Bools, Floats
@@ -39,6 +48,7 @@ def validate_law(law: LawRecord) -> None:
     _check_names(law, origin)
     _check_symbols(law, origin)
     _check_constraints(law, origin)
+    _check_back_stresses(law, origin)
 
 
 def symbols_used(law: LawRecord) -> set[sympy.Basic]:
@@ -130,6 +140,25 @@ def _check_constraints(law: LawRecord, origin: str) -> None:
             raise LawError(f"{origin}: a constraint mentions unknown symbol {', '.join(undeclared)}")
 
 
+def _check_back_stresses(law: LawRecord, origin: str) -> None:
+    """Only the effective stress, that less the back stresses, has the direction of the flow."""
+    if not law.back_stresses:
+        return
+    written = f"stress - {' - '.join(symbol.name for symbol in law.back_stresses)}"
+    effective, own = sympy.Dummy(real=True), {*law.back_stresses}
+    rates = {f"term '{label}'": (expression, own) for label, expression in law.terms.items()}
+    for symbol, state in law.states.items():
+        rates[f"rate of state '{symbol}'"] = state.rate, set() if symbol in own else own
+    for position, (expression, excluded) in rates.items():
+        left = expression.subs(law.effective_stress, effective).free_symbols
+        if stray := left & ({stress, principal_stress, mean_stress} | excluded):
+            names = ", ".join(sorted(map(str, stray)))
+            raise LawError(
+                f"{origin}, {position}: {names} stands beside the effective stress; a law with a back stress takes "
+                f"stress as {written} alone"
+            )
+
+
 LARGEST_SIZE = 1450
 """Of a rate: its first derivatives then have some 6000 nodes, and its kernel is made in seconds."""
 
@@ -154,6 +183,7 @@ def structure_of(law: LawRecord) -> str:
     with _failures_said(law):
         parts = [f"{label} = {sympy.srepr(expression)}" for label, expression in law.terms.items()]
         parts += [f"{s.name}' = {sympy.srepr(v.rate)} from {v.initial!r} to {v.limit!r}" for s, v in law.states.items()]
+        parts += [f"{s.name} is a back stress" for s in law.back_stresses]
         parts += [f"{s.name}: {p.scale}" for s, p in law.params.items()]
         parts += [f"{s.name} in {s.unit}" for s in law.conditions]
         return "\n".join(parts)
@@ -276,6 +306,16 @@ class LawRecord:
             cached = tuple(sorted(found, key=lambda symbol: str(symbol.name)))
             object.__setattr__(self, "_conditions", cached)
         return cached
+
+    @property
+    def back_stresses(self) -> tuple[sympy.Symbol, ...]:
+        """Its internal variables that are back stresses."""
+        return tuple(symbol for symbol, state in self.states.items() if state.kind == "back stress")
+
+    @property
+    def effective_stress(self) -> sympy.Expr:
+        """The stress along which it flows: that less its back stresses."""
+        return stress - sympy.Add(*self.back_stresses)
 
     @property
     def fingerprint(self) -> str:

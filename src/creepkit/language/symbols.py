@@ -258,6 +258,9 @@ class Param:
         return low - tolerance <= value <= high + tolerance
 
 
+StateKind = Literal["scalar", "back stress"]
+
+
 @checked
 @dataclass(frozen=True)
 class State:
@@ -266,6 +269,9 @@ class State:
     initial : value at time zero.
     rate : sympy expression for its rate, per second.
     limit : value at which the material point has failed (rupture), or None.
+    kind : "scalar", or "back stress", MPa, which has a direction: X of a law of stress - X, a bar of which flows in the
+        direction of stress - X. Its rate is that of its component along the flow, such as
+        (C - gamma * X) * creep - r * X with creep = A * (stress - X)**n.
     """
 
     initial: float
@@ -273,9 +279,12 @@ class State:
     meaning: str = "internal variable"
     unit: str = "1"
     limit: float | None = None
+    kind: StateKind = "scalar"
 
     def __post_init__(self) -> None:
         _check_text("state", self.meaning, self.unit)
+        if self.kind == "back stress" and (self.unit != "MPa" or self.limit is not None):
+            raise LawError(f"state '{self.meaning}': a back stress has unit=\"MPa\" and no limit")
         for name in ("initial", "limit"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(float(value)):

@@ -44,6 +44,10 @@ LARGEST_STRAIN = 2.0
 """Up to which loss of section is taken into account; beyond it readings are none."""
 
 
+LEAST_RECOVERY, RECOVERED = 1e-3, 5.0
+"""Share of the range of the readings, and standard deviations of one, that a mean of three falls by in recovery."""
+
+
 STEEP, LAST_FRAMES = 2.0, 5
 """Slope of ln output over ln time from which on a curve runs away, and the frames at its end that tell."""
 
@@ -110,6 +114,20 @@ def shows_primary_creep(history: History) -> bool:
     least = CLEAR * noise_of_readings(values) / float(np.ptp(values))
     parts = [part for part in PARTS_OF_STRAIN if part[1] > least or part in PARTS_OF_STRAIN[:3]]
     return _rises_in_a_part(values, times, parts) or _falls_at_first(times, values)
+
+
+def shows_recovery(history: History) -> bool:
+    """Whether a bar shortens, by more than noise, under a tension to which its stress has fallen, or none."""
+    if history.loading.quantity != "stress":
+        return False
+    least = LEAST_RECOVERY * float(np.ptp(history.outputs[growing_output(history)][history.used]))
+    for segment in load_segments(history):
+        times, values = _curve(history, segment.frames)
+        means = np.convolve(values, np.full(3, 1.0 / 3.0), "valid") if values.size > 3 else values[:0]
+        fallen = not segment.load_increased and segment.load >= 0.0 and means.size > 0
+        if fallen and means[0] - means.min() > max(least, RECOVERED * noise_of_readings(values, times)):
+            return True
+    return False
 
 
 def falls_logarithmically(history: History) -> bool:

@@ -184,6 +184,8 @@ def _rate_group(law: CreepLaw, symbol: sympy.Symbol, state: State) -> TermGroup 
     rate_parameters = {
         p: param for p, param in law.params.items() if any(p in z.rate.free_symbols for z in law.states.values())
     }
+    if symbol in law.back_stresses:
+        return None
     rate_law = replace(law, terms={f"rate of {symbol}": sign * state.rate}, params=rate_parameters, constraints=())
     other_expressions = [*law.terms.values(), *(z.rate for s, z in law.states.items() if s != symbol)]
     shared = {name for name in rate_law.names if any(law.symbol(name) in e.free_symbols for e in other_expressions)}

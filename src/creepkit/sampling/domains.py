@@ -71,9 +71,11 @@ CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 
 @lru_cache(maxsize=64)
 def constraint_functions(law: CreepLaw) -> tuple[Callable[..., Any], ...]:
-    """Each constraint of a law as a function of the point, the internal variables and the author's parameters."""
+    """Each constraint of a law as a function of the point, internal variables and parameters; that it flows is one."""
     arguments = (*POINT_VARIABLES, *law.states, *law.params)
-    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in law.constraints)
+    flowing = [law.effective_stress > 0] if law.back_stresses else []
+    relations = (*law.constraints, *flowing)
+    return tuple(sympy.lambdify(arguments, relation, "numpy", dummify=True) for relation in relations)
 
 
 def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:

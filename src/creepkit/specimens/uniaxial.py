@@ -89,7 +89,8 @@ class Uniaxial(Bar):
 
         theta : (candidates, parameters) internal values.
         """
-        levels = [strain_levels(history, self.point_test(history)) for history in histories]
+        turns = bool(law.back_stresses)
+        levels = [strain_levels(history, self.point_test(history), turns=turns) for history in histories]
         result = self._integrate(law, theta, [own.test for own in levels], sensitivities)
         prediction = self._observed_prediction(histories, result)
         last = np.array([h.times[-1] for h in histories])
@@ -166,7 +167,7 @@ class StrainLevels:
 
     test : the point test that is followed to the horizon.
     frames : (levels,) the frame of each. creep : (frames,) logarithmic creep strain that was measured; a frame where it
-        is not finite or not above SMALLEST_STRAIN has no level, nor has any of a bar that is pressed.
+        is not finite or not above SMALLEST_STRAIN has no level, nor has any of a bar that is pressed, or turns.
     """
 
     test: PointTest
@@ -175,10 +176,13 @@ class StrainLevels:
 
 
 @lru_cache(maxsize=4096)
-def strain_levels(history: History, test: PointTest) -> StrainLevels:
-    """The levels of a history; `test` is what its material point goes through."""
+def strain_levels(history: History, test: PointTest, *, turns: bool = False) -> StrainLevels:
+    """The levels of a history; `test` is what its material point goes through.
+
+    turns : whether it may creep backwards once the stress has fallen.
+    """
     creep = _measured_creep_strain(history)
-    if (test.driving.values < 0.0).any():
+    if (test.driving.values < 0.0).any() or (turns and (np.diff(test.driving.values) < 0.0).any()):
         creep = np.full_like(creep, np.inf)
     frames = np.flatnonzero(np.isfinite(creep) & (creep > SMALLEST_STRAIN))
     frames = frames[np.argsort(creep[frames], kind="stable")]

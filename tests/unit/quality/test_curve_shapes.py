@@ -307,5 +307,5 @@ def test_few_readings_show_that_a_curve_runs_away(count):
     runs_away, steady, primary = (
         sum(seen(curve) for _ in range(50)) for curve in (1 - (1 - shares) ** 0.2, shares, np.sqrt(shares))
     )
-    assert runs_away > 45
+    assert runs_away > 40
     assert steady + primary <= 1

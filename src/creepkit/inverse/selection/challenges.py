@@ -416,8 +416,11 @@ class AlteredLaw:
 def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
     """The sum of the best law and another one that carries SHARE of the rate; None where it is the best law itself.
 
+    None as well where one has a back stress: the other would flow along another stress.
     FitError where one of them has no rate at the reference point of its own, or where it cannot be fitted.
     """
+    if best.law.back_stresses or other.law.back_stresses:
+        return None
     start, own_terms = best.log_rate - other.log_rate, len(best.problem.coordinates.term_rates)
     law = best.law + other.law
     problem = _of_law(best.problem, law)
@@ -435,8 +438,8 @@ def sum_with_share(best: FittedLaw, other: FittedLaw) -> AlteredLaw | None:
 def above_threshold(best: FittedLaw) -> AlteredLaw:
     """The best law above a threshold stress; CreepkitError where it cannot be fitted."""
     threshold = THRESHOLD * best.problem.coordinates.reference.stress
-    s_0 = Symbol("s_0_threshold")
-    terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
+    s_0, effective = Symbol("s_0_threshold"), best.law.effective_stress
+    terms = {label: term.subs(effective, sympy.Max(effective - s_0, 0)) for label, term in best.law.terms.items()}
     param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
     law = replace(
         best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}

@@ -40,8 +40,11 @@ ALIKE = 2.0
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
-    """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening."""
-    return [a + b for a, b in combinations(_distinct_laws(laws), 2)]
+    """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening.
+
+    A law with a back stress flows along a stress of its own, and is in no sum.
+    """
+    return [a + b for a, b in combinations(_distinct_laws(laws), 2) if not (a.back_stresses or b.back_stresses)]
 
 
 def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
@@ -139,7 +142,11 @@ def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLa
     suited = [_with_temperature_of(laws, law, histories) for law in (candidates(histories) if histories else [])]
     with suppress(LawError):  # of one with primary creep of its own
         suited += [laws[0].with_primary()] * bool(laws[0].states)
-    sums = [laws[0] + other for other in laws[1:] if not (laws[0].states and other.states)]  # a piece breaks once
+    sums = [
+        laws[0] + other
+        for other in laws[1:]
+        if not ((laws[0].states and other.states) or laws[0].back_stresses or other.back_stresses)
+    ]  # a piece breaks once, and flows along one effective stress
     free = {name for law in laws for name in law.names}
     fixed = {name: value for law in laws for name, value in fixed_values(law).items() if name not in free}
     suited = [_with_fixed(law, fixed) for law in suited]
