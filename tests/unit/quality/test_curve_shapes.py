@@ -295,7 +295,7 @@ def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(change):
     assert repeated_rows([row("a", **numbers), row("b", **{**numbers, **change})]) == {}
 
 
-@pytest.mark.parametrize("count", [5, 7, 9, 11])
+@pytest.mark.parametrize("count", [6, 7, 9, 11])
 def test_few_readings_show_that_a_curve_runs_away(count):
     """Kachanov's curve 1 - (1 - t)^(1/5) with 2 % of noise, and a steady one and one of primary creep with as much."""
     rng, shares = np.random.default_rng(count), np.linspace(0.0, 0.995, count)
@@ -307,5 +307,5 @@ def test_few_readings_show_that_a_curve_runs_away(count):
     runs_away, steady, primary = (
         sum(seen(curve) for _ in range(50)) for curve in (1 - (1 - shares) ** 0.2, shares, np.sqrt(shares))
     )
-    assert runs_away > 40
+    assert runs_away > 45
     assert steady + primary <= 1
