@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7422,
     "records": 2473,
     "registry": 615,
-    "reports": 6698,
+    "reports": 6703,
     "rupture_assessment": 1825,
     "sampling": 956,
     "screening": 571,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.compared_tests import STRAIN_OF_UNKNOWN_DURATION, duration_known, rests_on_durations
 from creepkit.inverse.extrapolation import SAME_STRESS, stresses_at_temperatures
 from creepkit.inverse.nuisance_parameters import beyond_intervals, nuisance_unit
@@ -252,13 +253,14 @@ def _table_of_tests(fit: Identification) -> Table:
                 "–" if first is None else number(first.errors.relative_squared_error, 2),
                 "–" if first is None else amount_text(first.offset, first.output),
                 number(test.rate_factor, 3),
+                number(test.life_factor, 3) if fit.noise_model.life > UNDETECTED_SCATTER else "–",
                 *_single_cells(None if first is not None else test.minimum_rate, 1.0 / PERCENT_PER_HOUR),
                 *_single_cells(end if first is None or (end and end.used) else None, SECONDS_PER_HOUR),
             )
         )
     columns = [
         *("test", "condition", "values", "χ², own rate", "misfit, law's rate", "squared error", "offset"),
-        *("rate × law", "minimum rate, %/h", "by the law, %/h", "law / measured"),
+        *("rate × law", "damage × law", "minimum rate, %/h", "by the law, %/h", "law / measured"),
         *("lasted, h", "by the law, h", "law / measured"),
     ]
     of_curves = "relative squared error and offset of the first output with the law's rate; a dash: no value is "

@@ -206,12 +206,14 @@ def _estimation(fit: Identification, references: References) -> Iterator[str]:
         "weighted": settings.weights != "likelihood",
         "nuisances": kinds,
         "": True,  # on the scatter of rates
+        "lives": fit.noise_model.life > UNDETECTED_SCATTER,
         "autocorrelated": True,
         "stated noise": any(one.stated > 0 for one in fit.noise_model.outputs.values()),
         "numerical error": fit.numerical_error,
     }
     values = {"starts": plural(settings.starts, "start"), "points": settings.sobol_points, "seed": settings.seed}
     values |= {"kinds": listed(kinds), "chance": AUTOCORRELATION_CONFIDENCE, "sd": NOISE_PRIOR_SD}
+    values |= {"lives": 100 * fit.noise_model.life}
     for kind in (kind for kind, true in holds.items() if true):
         yield references.said(kind, **values) if kind else rate_scatter_sentence(fit)
 

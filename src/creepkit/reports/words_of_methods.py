@@ -114,6 +114,8 @@ METHODS = {
     # it is not
     "scatter": "the creep rates of single tests scatter by {scatter:.3g} % about the law (one standard deviation of "
     "their logarithm), as was estimated",
+    # lives do, as curves to rupture show
+    "lives": "the rates of damage of single tests scatter by {lives:.3g} % beside those of creep",
     # readings or tests were
     "left out": "readings of {tests}, or whole tests, were left out for the reasons in the report",
     # laws of several temperatures
