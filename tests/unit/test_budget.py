@@ -30,18 +30,18 @@ BUDGET = {
     "forecasts": 1184,
     "instruments": 1159,
     "integration": 801,
-    "inverse": 9489,
+    "inverse": 9511,
     "jobs": 245,
     "kernels": 1691,
     "language": 1602,
     "law_search": 765,
     "laws": 136,
     "modules": 749,
-    "quality": 1230,
+    "quality": 1242,
     "readers": 7422,
     "records": 2473,
     "registry": 615,
-    "reports": 6693,
+    "reports": 6698,
     "rupture_assessment": 1825,
     "sampling": 956,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32_061
+TESTS = 32_079
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
+from creepkit.inverse.compared_tests import has_tertiary_creep
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.minimum_rates import measured_minimum_rate
 from creepkit.inverse.single_values import SingleValue
@@ -19,6 +20,10 @@ from creepkit.records import History, constant_stress
 
 STRESS_RATIO, TEMPERATURE_RATIO = 1.05, 1.005
 """Ratios of stresses and of temperatures between which exponent and energy of bars are taken, to each side."""
+
+
+LEAST_SHARE, STRAINS = 1e-3, 41
+"""Of the reference strain, the first of the strains among which the minimum rate of a law is looked for; how many."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +62,9 @@ def minimum_rates_of(fit: Identification) -> list[MinimumRate]:
 class StateAtStrain:
     """The state of a bar under constant true stress, at the reference stress and temperature, at the reference strain.
 
-    time : s, rate : 1/s, exponent : d ln rate / d ln stress and energy : -R d ln rate / d(1/T), J/mol, of bars at that
-    strain, each with its 95 % interval, (value, low, high).
+    Of a law with tertiary creep that of the least rate, at whatever strain. time : s, rate : 1/s, exponent :
+    d ln rate / d ln stress and energy : -R d ln rate / d(1/T), J/mol, of such bars, each with its 95 % interval,
+    (value, low, high).
     """
 
     time: tuple[float, float, float]
@@ -75,6 +81,8 @@ def depends_on_history(law: CreepLaw) -> bool:
 def state_at_strain(fit: Identification) -> StateAtStrain | None:
     """At the tested point; None where the law never gets to that strain, or no predictor follows bars to it.
 
+    The rate of a law with tertiary creep rises at any strain by what its bars have suffered: stated is its minimum.
+
     A derivative of the law's formula holds time, strain and internal variables. Bars under different stresses reach one
     strain at different times, so that the exponent which measured rates show is another one: with time hardening,
     rate = A s^n t^m, the strain A s^n t^(1 + m) / (1 + m) is reached after a time ~ s^(-n / (1 + m)), at a rate
@@ -83,13 +91,16 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
     r, predictor = fit.tested_point, fit.predictor
     if predictor is None:
         return None
-    halves, stresses = np.array([0.5, 1.0]), r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
+    shares = np.array([0.5, 1.0])
+    if has_tertiary_creep(fit.law):
+        shares = np.geomspace(LEAST_SHARE, max(fit.ranges["strain"][1] / r.strain, 1.0), STRAINS)
+    stresses = r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
     temperatures = r.temperature * TEMPERATURE_RATIO ** np.array([0.0, 0.0, 0.0, -1.0, 1.0])
     bars = [
         History(
             f"bar {k}",
-            r.time * halves,
-            {"strain": r.strain * halves},
+            r.time * shares,
+            {"strain": r.strain * shares},
             constant_stress(float(stress), "stress"),
             float(temperature),
             strain_measure="logarithmic",
@@ -103,8 +114,13 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
         reached = predictor.predict_to_rupture(fit.law, flat, bars).times_to_strain
         assert reached is not None
         with np.errstate(divide="ignore", invalid="ignore"):
-            log_time = np.log(reached.times[..., 1])
-            log_rate = np.log(reached.log_time_derivatives[..., 1]) - log_time
+            log_times = np.log(reached.times)
+            log_rates = np.log(reached.log_time_derivatives) - log_times
+        if shares.size > 2:
+            least = np.where(np.isfinite(log_rates), log_rates, np.inf).argmin(axis=-1)[..., None]
+        else:
+            least = np.ones((*log_rates.shape[:-1], 1), int)
+        log_time, log_rate = (np.take_along_axis(v, least, axis=-1)[..., 0] for v in (log_times, log_rates))
         exponent = (log_rate[:, 2] - log_rate[:, 0]) / (2 * np.log(STRESS_RATIO))
         energy = GAS_CONSTANT * (log_rate[:, 4] - log_rate[:, 3]) / -np.diff(1.0 / temperatures[3:])
         return np.stack([log_time[:, 1], log_rate[:, 1], exponent, energy], axis=-1).reshape(*theta.shape[:-1], 4)

@@ -12,6 +12,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
 from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, known_sd
 from creepkit.inverse.nuisance_parameters import Perturbation
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
@@ -319,10 +320,12 @@ class _Likelihood:
 def _bounds(
     residuals: Residuals, noise_model: NoiseModel, output: str, name: str, longest_drift: float
 ) -> tuple[float, float]:
-    """Bounds of the logarithm of a component: an offset up to the typical output itself."""
+    """Bounds of the logarithm of a component: an offset up to the typical output itself, lives as far as ends lie."""
     low, high = BOUNDS.get(name, (1e-4, 5.0))
     if name == "correlation_length":
         high = longest_drift
+    elif name == "life":
+        high = max(_scatter_of_ends(residuals, noise_model, high), 2.0 * low)
     elif name == "noise":
         measured, stated = noise_model[output].noise, noise_model[output].stated
         low = stated if stated > 0 else SMALLEST_NOISE_RATIO * measured
@@ -332,3 +335,16 @@ def _bounds(
         high = float(np.median(1.0 / np.maximum(residuals.offset_sensitivity[mask], 1e-12)))
         low = 1e-5 * high
     return float(np.log(low)), float(np.log(high))
+
+
+def _scatter_of_ends(residuals: Residuals, noise_model: NoiseModel, unknown: float) -> float:
+    """Root mean square by which rupture times of tests that broke miss the law, in ln; `unknown` where none is known.
+
+    The damage of curves by a law of another shape scatters by more, with rates against it, and says nothing of lives.
+    """
+    if RUPTURE_OUTPUT not in noise_model.outputs:
+        return unknown
+    broke = residuals.present & (residuals.output_index == list(noise_model.outputs).index(RUPTURE_OUTPUT))
+    if residuals.stopped.sd is not None:
+        broke &= residuals.stopped.shift == 0.0
+    return float(np.sqrt(np.mean(residuals.values[broke] ** 2))) if broke.any() else unknown

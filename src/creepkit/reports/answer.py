@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from creepkit.exporters.documents import expression_mathml, law_equations
 from creepkit.exporters.exporting import input_of_programs
+from creepkit.inverse.compared_tests import has_tertiary_creep
 from creepkit.inverse.identified_values import StateAtStrain, depends_on_history, state_at_strain
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.inverse.uncertainty.laplace_approximation import NOT_DETERMINED, POORLY_DETERMINED, interval_ends
@@ -132,7 +133,8 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
     r = fit.tested_point
     of_state = ""
     if depends_on_history(fit.law):
-        of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else f", {100 * r.strain:.2g} % strain"
+        of_strain = ", minimum rate" if states_minimum(fit) else f", {100 * r.strain:.2g} % strain"
+        of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else of_strain
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
     rate, exponent, energy = rate_exponent_and_energy(fit)
     by_tests = words.MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
@@ -429,6 +431,11 @@ def _state(fit: Identification) -> StateAtStrain | None:
     return state_at_strain(fit) if depends_on_history(fit.law) and not rate_of_time(fit.law) else None
 
 
+def states_minimum(fit: Identification) -> bool:
+    """Whether the rate amid the tests is the least of a bar, as of laws with tertiary creep."""
+    return has_tertiary_creep(fit.law) and not rate_of_time(fit.law)
+
+
 def rate_of_time(law: CreepLaw) -> bool:
     """Whether time is all that the rate knows of its past: its exponent is then that of equal times, which tests show.
 
@@ -452,7 +459,8 @@ def reference_sentences(fit: Identification) -> list[str]:
     if state is not None:
         hours = interval_text(tuple(v / SECONDS_PER_HOUR for v in state.time), "h")
         at = f"{number(r.stress)} MPa and {celsius_text(r.temperature, digits=0)}"
-        lines.append(f"a bar under a true stress of {at} reaches {100 * r.strain:.2g} % strain after {hours}")
+        reaches = "its minimum rate" if states_minimum(fit) else f"{100 * r.strain:.2g} % strain"
+        lines.append(f"a bar under a true stress of {at} reaches {reaches} after {hours}")
     if held and (held != "strain" or state is None):
         formula = interval_text(tuple(map(float, fit.local_exponent(r.stress, warn=False))))
         lines.append(f"at constant {held} the slope of the law's formula over stress is {formula}")

@@ -9,6 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 import creepkit as ck
 from creepkit.records import History, constant_stress
+from creepkit.reports.answer import key_figures
 from helpers.rupture_tests import BAR
 
 HOUR, STRESSES = 3600.0, (95.0, 110.0, 125.0, 140.0, 155.0, 170.0)
@@ -72,3 +73,12 @@ def test_lives_that_scatter_with_rates_have_no_scatter_of_their_own():
     fit = ck.identify(ck.law("kachanov-rabotnov").fix(alpha=0), tests, using=BAR)
     assert fit.adequacy.explains
     assert fit.noise_model.life < 2e-3 < fit.noise_model.rate
+
+
+def test_the_stress_exponent_of_a_law_with_damage_is_that_of_its_minimum_rate():
+    """At one strain bars of different stress have suffered differently, and their rates follow another exponent."""
+    fit = ck.identify(ck.law("kachanov-rabotnov").fix(alpha=0), bars(kachanov, "load", 1, (0.0, 0.0)), using=BAR)
+    (exponent, *_) = key_figures(fit)
+    assert exponent.where.endswith("minimum rate")
+    assert exponent.low < 6.0 < exponent.high
+    assert exponent.value == pytest.approx(6.0, abs=0.05)

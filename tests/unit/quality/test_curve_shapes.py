@@ -293,3 +293,19 @@ def test_a_row_that_repeats_a_rate_and_a_time_is_told_and_kept():
 def test_rows_that_differ_in_a_digit_or_in_the_heat_are_two(change):
     numbers = {"stress": 150.0, "hours": 812.4, "rate": 3.21e-9}
     assert repeated_rows([row("a", **numbers), row("b", **{**numbers, **change})]) == {}
+
+
+@pytest.mark.parametrize("count", [6, 7, 9, 11])
+def test_few_readings_show_that_a_curve_runs_away(count):
+    """Kachanov's curve 1 - (1 - t)^(1/5) with 2 % of noise, and a steady one and one of primary creep with as much."""
+    rng, shares = np.random.default_rng(count), np.linspace(0.0, 0.995, count)
+
+    def seen(curve):
+        strain = 0.05 * curve / curve[-1] + rng.normal(0.0, 1e-3, count) * (shares > 0)
+        return shows_tertiary_creep(History("one", 1e4 * shares, {"strain": strain}, constant_stress(100.0), 900.0))
+
+    runs_away, steady, primary = (
+        sum(seen(curve) for _ in range(50)) for curve in (1 - (1 - shares) ** 0.2, shares, np.sqrt(shares))
+    )
+    assert runs_away > 45
+    assert steady + primary <= 1

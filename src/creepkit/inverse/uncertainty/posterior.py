@@ -187,7 +187,8 @@ class Posterior:
         if fit.settings.weights != "likelihood":
             estimator = WorkingNoiseEstimator(fit.settings, problem.observations)
             weighting = estimator.weighting(estimator.estimate(linear, estimator.initial()))
-        noise_model = weighting or fit.noise_model
+        expected = with_expected_scatter(problem, linear, fit.noise_model)
+        noise_model = weighting or expected
         residuals, nuisances, count = problem.residuals(fit.x), problem.nuisance_parameters, fit.u.size
         e = fit.x[count:]
         factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
@@ -217,7 +218,7 @@ class Posterior:
         least = float(found.chi_square(*found.residuals(fit.u[None]))[0])
         if weighting is not None:
             solution = linear.whole.solve(all_noise)
-            step, own = solution.step[:count], covariance_of_values(linear, fit.noise_model, weighting)
+            step, own = solution.step[:count], covariance_of_values(linear, expected, weighting)
             covariances = [c[:count, :count] for c in (own, solution.covariance)]
             information = EstimatorInformation(fit.u + step, *map(scaled_inverse, covariances))
             least -= float(step @ information.weighted @ step)
