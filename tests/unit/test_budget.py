@@ -23,7 +23,7 @@ BUDGET = {
     "dataset": 713,
     "discovery": 1389,
     "experiments": 1270,
-    "exporters": 3350,
+    "exporters": 3354,
     "extraction": 1289,
     "fem": 1440,
     "files": 1313,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32_078
+TESTS = 32_079
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

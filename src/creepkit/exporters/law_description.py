@@ -52,11 +52,11 @@ def refuse_conditions(law: CreepLaw, target: str) -> None:
 
 
 def refuse_back_stress(law: CreepLaw) -> None:
-    """ExportError, with what to do, where a law has a back stress: programs have a scalar for a state."""
+    """ExportError, with what to do, where a law has a back stress: finite element codes have a scalar for a state."""
     if law.back_stresses:
         raise ExportError(
-            f"law '{law.name}' has a back stress, whose direction programs do not follow; export it as 'latex', "
-            "'markdown' or 'mathml', or a law without one"
+            f"law '{law.name}' has a back stress, which has a direction, and this target takes scalars; export it as "
+            "'latex', 'markdown', 'mathml' or 'python', or a law without one"
         )
 
 

@@ -18,7 +18,7 @@ import sympy
 
 from creepkit.errors import SAID, ExportError, LawError, restated
 from creepkit.exporters.law_code import Identifiers, factor_text
-from creepkit.exporters.law_description import comment_lines, heading, printable_text, refuse_back_stress
+from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.exporters.unit_conversion import STRESSES
 from creepkit.hookspecs import hookimpl
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter, joined
@@ -51,6 +51,12 @@ class PythonDialect:
     overflow_sentence: str
 
 
+ALONG_THE_FLOW = (
+    "Stress and back stress are components along the flow, whose sign is that of their difference; where it turns, "
+    "both change sign."
+)
+
+
 def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
     """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
     source = source.without_inactive_terms()
@@ -58,7 +64,8 @@ def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
         functions = _ModuleFunctions(source, dialect)
     body = functions.text()
     floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
-    lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]
+    along = [ALONG_THE_FLOW] if source.law.back_stresses else []
+    lines = [*heading(source, mentions_floors=floors), *along, *functions.renaming_notes(), dialect.overflow_sentence]
     opening_lines = ['"""A creep law with its values, exported by creepkit."""', "", *comment_lines(lines, "#"), ""]
     return "\n".join([*opening_lines, with_helpers(body, dialect)]) + "\n"
 
@@ -71,7 +78,6 @@ class _ModuleFunctions:
 
     def __init__(self, source: LawWithValues, dialect: PythonDialect) -> None:
         self.source, self.law, self.dialect = source, source.law, dialect
-        refuse_back_stress(self.law)
         form = log_form(self.law)
         self._identifiers = Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_MODULE_NAMES))
         symbols = (*POINT_VARIABLES, *self.law.states, *self.law.conditions, *self.law.params)
