@@ -38,7 +38,7 @@ from creepkit.testing import LawSamples, draw_samples
 from creepkit.testing.parity import KernelTable, MultiprecisionReference, largest_differences
 from creepkit.testing.sample_points import constraints_hold
 from helpers.literature_laws import EQUATIONS
-from helpers.registered_laws import registered_laws
+from helpers.registered_laws import laws_of_scalars
 
 TOLERANCE = 1e-10
 SETS, POINTS = 2, 8
@@ -78,7 +78,7 @@ MULTIAXIAL = CreepLaw(
 """The rate and the growth feel all three stresses about equally."""
 
 LAWS: dict[str, CreepLaw] = {
-    **{f"registered {name}": law for name, law in registered_laws().items() if not law.back_stresses},
+    **{f"registered {name}": law for name, law in laws_of_scalars().items()},
     **{f"foreign {name}": law for name, law in EQUATIONS.items()},
     "pieces": PIECES,
     "multiaxial": MULTIAXIAL,

@@ -41,7 +41,7 @@ BUDGET = {
     "readers": 7422,
     "records": 2473,
     "registry": 615,
-    "reports": 6703,
+    "reports": 6718,
     "rupture_assessment": 1825,
     "sampling": 956,
     "screening": 571,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32_079
+TESTS = 32_081
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

@@ -131,12 +131,14 @@ def key_figures(fit: Identification) -> list[KeyFigure]:
         found = [KeyFigure("stress exponent", where, *interval, remark=by_law), *_lives(fit)]
         return [one for one in (*found, by_rates) if math.isfinite(one.value)]
     r = fit.tested_point
-    of_state = ""
+    state, of_state = _state(fit), ""
     if depends_on_history(fit.law):
-        of_strain = ", minimum rate" if states_minimum(fit) else f", {100 * r.strain:.2g} % strain"
+        of_strain = f", {100 * r.strain:.2g} % strain"
+        if states_minimum(fit):
+            of_strain = ", minimum rate" if state is not None else ", initial rate"
         of_state = f", after {time_text(r.time)}" if rate_of_time(fit.law) else of_strain
     at = f"{r.stress:.4g} MPa, {celsius_text(r.temperature, digits=0)}{of_state}{r.conditions_text(fit.law)}"
-    rate, exponent, energy = rate_exponent_and_energy(fit)
+    rate, exponent, energy = rate_exponent_and_energy(fit, state)
     by_tests = words.MEAN_SLOPE.format(value=f"{measured:.2g}") if math.isfinite(measured) else ""
     figures = [_with_interval("stress exponent", at, exponent, remark=by_tests)]
     if fit.law.uses(temperature) and float(np.ptp(fit.ranges["temperature"])) > ISOTHERMAL_RANGE:
@@ -413,13 +415,12 @@ def unit_text(unit: str) -> str:
 # ---- rate and stress exponent amid the tests -------------------------------------------------------------------------
 
 
-def rate_exponent_and_energy(fit: Identification) -> tuple[tuple[float, ...], ...]:
+def rate_exponent_and_energy(fit: Identification, state: StateAtStrain | None) -> tuple[tuple[float, ...], ...]:
     """Creep rate, 1/s, stress exponent and activation energy, J/mol, amid the tests: of bars at the reference strain.
 
     (value, low, high) each. Where the law has no more than stress, temperature and time, or no bar can be followed,
-    those of the formula.
+    those of the formula. state : of such a bar, if any.
     """
-    state = _state(fit)
     if state is not None:
         return state.rate, state.exponent, state.energy
     stress = fit.tested_point.stress

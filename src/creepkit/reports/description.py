@@ -16,7 +16,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import NORMAL_QUANTILE
 from creepkit.records import is_logarithmic
 from creepkit.records.units import celsius_text, time_text
 from creepkit.reports.blocks import ends, plural, plural_of
-from creepkit.reports.verdicts import cause_headline
+from creepkit.reports.verdicts import cause_headline, nuisance_values
 from creepkit.reports.wording import first_kind, say
 from creepkit.reports.words import FITS, HEADLINES, MEAN_MISFIT, MISSES, ONE_TEST, TRUTHS
 
@@ -200,7 +200,17 @@ def _truth(fit: Identification) -> str:
     adequacy = fit.adequacy
     if adequacy is None or adequacy.verdict == "cannot be judged":
         return TRUTHS["not judged"]
-    kind = first_kind({"explains": adequacy.explains, "in tests": adequacy.lies_in_tests, "rejected": True})
+    only = [*adequacy.implausible, None][0]
+    kind = first_kind(
+        {
+            "implausible": adequacy.explains and only,
+            "explains": adequacy.explains,
+            "in tests": adequacy.lies_in_tests,
+            "rejected": True,
+        }
+    )
+    if kind == "implausible" and only is not None:
+        return say(TRUTHS[kind], **nuisance_values(only))
     return say(TRUTHS[kind], cause="".join(map(cause_headline, adequacy.explanations[:1])))
 
 

@@ -97,6 +97,9 @@ def leading_outputs(fit: Identification) -> dict[str, list[int]]:
 
 def summary_panels(fit: Identification) -> dict[str, Callable[[Axes], None]]:
     """{what a panel shows: how it is drawn}: curves coloured by stress or temperature; rates over stress; lives."""
+    if not fit.histories:
+        what = "this identification was loaded from a file without its tests"
+        raise FitError(f"{what}: draw fit.with_histories(ck.read_histories(...))")
     scale, leading = _curve_scale(fit), leading_outputs(fit)
     panels: dict[str, Callable[[Axes], None]] = {}
     if leading:

@@ -395,9 +395,13 @@ def numerical_error_text(found: NumericalError) -> str:
 def nuisance_text(one: ImplausibleNuisance, kind: str = "nuisance") -> str:
     """Such as "an offset of 0.095 mm in amplitude of 'D1', 24 % of its largest value"; kind : of REMARKS."""
     share = say(REMARKS["of value" if one.output else "of length"], one=one) if np.isfinite(one.share) else ""
-    amounts = {"amount": _amount(one.value, one.unit), "size": _amount(one.size, one.unit)}
-    article, expected = "an" if one.kind[0] in "aeiou" else "a", say(REMARKS[one.size_source], one=one)
-    return say(REMARKS[kind], one=one, share=share, article=article, expected=expected, **amounts)
+    size, expected = _amount(one.size, one.unit), say(REMARKS[one.size_source], one=one)
+    return say(REMARKS[kind], share=share, expected=expected, size=size, **nuisance_values(one))
+
+
+def nuisance_values(one: ImplausibleNuisance) -> dict[str, Any]:
+    """What texts on it are made of."""
+    return {"one": one, "article": "an" if one.kind[0] in "aeiou" else "a", "amount": _amount(one.value, one.unit)}
 
 
 def _amount(value: float, unit: str) -> str:

@@ -1,8 +1,7 @@
 """What results say: every sentence of headlines, cautions, next steps, verdicts and remarks.
 
-Whoever words a result edits these texts and no code. A sentence has 25 words at most and no full stop. Braces hold what
-the result puts in, behind a colon with how it is written (wording.FORMATS); what stands between < and > is left out
-where that is nothing.
+Whoever words a result edits these texts, no code. A sentence has 25 words at most, no full stop. Braces hold what the
+result puts in, after a colon how it is written (wording.FORMATS); what stands between < and > is left out without it.
 """
 
 from __future__ import annotations
@@ -35,7 +34,9 @@ FITS, MISSES = "{what} within {misfit}", "{what} by {misfit}"
 TRUTHS = {
     # no noise is stated, and too few readings show it
     "not judged": "whether it is exact cannot be judged",
-    # the p-value is 0.3 % or more
+    # the p-value is 0.3 % or more, by a nuisance three standard deviations from what was stated
+    "implausible": "only {article} {one.kind} of {amount} keeps the tests from rejecting it",
+    # without
     "explains": "the tests do not reject it",
     # what it misses lies in single tests, or in two groups of them (their sentence follows)
     "in tests": "{cause}",
@@ -348,8 +349,7 @@ CAUSES_AT_LENGTH = {
     "one test": "test '{one.tests[0]}' ({one.condition}) creeps {factor:.3g} times as fast as the others say"
     "< (or '{near}' is to blame)><; it would agree with them {errors}><; without it {without}>",
     # as above
-    "tests": "tests {one.tests:quoted} creep {one.factors:factors} times as fast as the others say"
-    "<; without it {without}>",
+    "tests": "tests {one.tests:quoted} creep {one.factors:factors} times as fast as others say<; without it {without}>",
     # as above
     "groups": "tests ({one.tests:six}) creep {factor:.3g} times as fast as the others at equal conditions: "
     "are they of one material?",

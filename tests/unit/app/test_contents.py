@@ -19,7 +19,7 @@ from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.norton import NORTON
 from creepkit.records import is_logarithmic
 from helpers.planted_bars import SPL, bars
-from helpers.registered_laws import registered_laws
+from helpers.registered_laws import laws_of_scalars
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +38,9 @@ def document(*arguments, **options):
     return json.loads(json.dumps(contents_document(page_contents(*arguments, **options)), allow_nan=False))
 
 
-@pytest.mark.parametrize("name", registered_laws())
+@pytest.mark.parametrize("name", laws_of_scalars())
 def test_every_law_has_a_page_and_a_first_curve(name):
-    shown = document(registered_laws()[name])
+    shown = document(laws_of_scalars()[name])
     (law,) = shown["laws"]
     for p in law["parameters"]:
         assert p["low"] <= p["value"] <= p["high"]

@@ -14,7 +14,7 @@ from helpers.export_cases import LAWS
 from helpers.javascript import run_in_node
 from helpers.page_runtime import in_page, pairs, values_that_creep
 from helpers.paths import ROOT
-from helpers.registered_laws import registered_laws
+from helpers.registered_laws import laws_of_scalars
 
 AGREEMENT = 1e-10
 """Relative; it is the same core, and the law differs by rounding."""
@@ -44,7 +44,7 @@ def as_options(loading, T):
 
 
 def laws():
-    return registered_laws() | {name: LAWS[name] for name in ("combined with temperature", "Kachanov with temperature")}
+    return laws_of_scalars() | {name: LAWS[name] for name in ("combined with temperature", "Kachanov with temperature")}
 
 
 def test_creep_of_every_law_is_that_of_the_specimen(tmp_path):
@@ -213,7 +213,7 @@ def check(found, run, what, rtol=DIMPLE_AGREEMENT):
 
 def test_a_dimple_of_every_law_is_that_of_the_core(model, data, tmp_path):
     cases, runs = [], []
-    for name, law in (registered_laws() | {"warm": LAWS["Kachanov with temperature"]}).items():
+    for name, law in (laws_of_scalars() | {"warm": LAWS["Kachanov with temperature"]}).items():
         values = values_that_creep(law, 100.0, goal=0.01, duration=4e4)
         cases.append((law, "simulateDimple", values, options(JUMP)))
         runs.append((name, simulated(model, law, values, JUMP)))
