@@ -38,7 +38,7 @@ BUDGET = {
     "laws": 136,
     "modules": 749,
     "quality": 1242,
-    "readers": 7422,
+    "readers": 7426,
     "records": 2473,
     "registry": 615,
     "reports": 6718,
@@ -52,7 +52,7 @@ BUDGET = {
 }
 """{package, or modules beside packages: lines}."""
 
-TESTS = 32_081
+TESTS = 32_084
 """Lines of tests, those of plugins included, without benchmarks."""
 
 

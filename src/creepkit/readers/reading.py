@@ -179,6 +179,10 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
             accepting = [reader for reader in accepting if reader.name not in general]
     if not accepting and path.suffix.lower() in TEXT_SUFFIXES:  # whose error says what it lacks
         accepting = [reader for reader in readers if reader.name == HISTORY_CSV.name]
+    if not accepting and path.is_dir():
+        raise HistoryError(
+            f"{path}: the folder holds no file of tests; put tables there (.csv, .txt, .xlsx), or name one"
+        )
     if not accepting:
         raise HistoryError(f"{path}: no reader understands it; known are {', '.join(one.name for one in readers)}")
     return only_one("reader", path, accepting, "reader")

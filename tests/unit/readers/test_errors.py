@@ -298,3 +298,9 @@ def test_texts_of_a_sheet_decide_about_their_decimal_sign(tmp_path: Path):
     assert history.elastic.at(history.temperature).E == pytest.approx(172250.0)
     assert history.outputs["stress"].tolist() == [170.5, 151.5, 128.5]
     np.testing.assert_allclose(history.times, [0.0, 360900.0, 3600000.0])
+
+
+def test_an_empty_folder_says_what_belongs_there(tmp_path):
+    with pytest.raises(HistoryError, match=r"the folder holds no file of tests; put tables there \(\.csv"):
+        ck.read_histories(tmp_path)
+
