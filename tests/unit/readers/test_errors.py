@@ -303,4 +303,3 @@ def test_texts_of_a_sheet_decide_about_their_decimal_sign(tmp_path: Path):
 def test_an_empty_folder_says_what_belongs_there(tmp_path):
     with pytest.raises(HistoryError, match=r"the folder holds no file of tests; put tables there \(\.csv"):
         ck.read_histories(tmp_path)
-
