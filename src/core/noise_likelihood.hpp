@@ -2,8 +2,8 @@
 //
 // An observation i of output o has the error
 //
-//     drift_o x1(t_i) + D u_i x2(t_i) + offset_o s_i x3 + rate d_i x4 + life b_i x5 + sum_k e_ik x_k + white noise of W_i,
-//     W_i = (noise_o w_i)^2 + misfit_o^2 + jitter,
+//     drift_o x1(t_i) + D u_i x2(t_i) + offset_o s_i x3 + rate d_i x4 + life b_i x5 + sum_k e_ik x_k
+//     + white noise of variance W_i,  W_i = (noise_o w_i)^2 + misfit_o^2 + jitter,
 //
 // where all x have unit variance. x1 and x2 are Ornstein-Uhlenbeck processes with correlation exp(-lag / length), drawn
 // anew for each output, as is the offset x3; x4, x5 and the random effects x_k are one for the whole test. Each is a state

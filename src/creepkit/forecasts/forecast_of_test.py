@@ -29,6 +29,7 @@ from creepkit.forecasts.draws import (
     first_crossing,
     has_sampled_draws,
 )
+from creepkit.inverse.adequacy import UNDETECTED_SCATTER
 from creepkit.inverse.extrapolation import HOUR, UNSEEN_RUPTURE, extrapolation_text, outside_combinations
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
@@ -265,7 +266,7 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
     for source, variance in best.own_variances.items():
         if variance > 0:
             sizes[source].append(f"{100 * np.sqrt(variance):.2g} % of the rate")
-    if fit.noise_model.life > NEGLIGIBLE_LIFE:
+    if fit.noise_model.life > UNDETECTED_SCATTER:
         sizes[LIFE_SCATTER].append(f"{100 * fit.noise_model.life:.2g} % of the life")
     for dimension in best.dimensions:
         unit = "mm" if is_length_nuisance(dimension.kind) else UNITS.get(dimension.kind, "")
@@ -278,10 +279,6 @@ def _includes(drawn: Sequence[DrawnLaw], best: DrawnLaw, outputs: Mapping[str, O
         if known.misfit > 0 or fit.noise_model.discrepancy > 0:
             sizes[MISFIT] = ["what the fitted tests showed beside the law"]
     return {part: ", ".join(texts) for part, texts in sizes.items()}
-
-
-NEGLIGIBLE_LIFE = 1e-3
-"""Scatter of ln of lives beside rates of which nothing is said."""
 
 
 FAR = 100.0

@@ -91,8 +91,8 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
     r, predictor = fit.tested_point, fit.predictor
     if predictor is None:
         return None
-    shares = np.array([0.5, 1.0])
-    if has_tertiary_creep(fit.law):
+    shares, is_least = np.array([0.5, 1.0]), has_tertiary_creep(fit.law)
+    if is_least:
         shares = np.geomspace(LEAST_SHARE, max(fit.ranges["strain"][1] / r.strain, 1.0), STRAINS)
     stresses = r.stress * STRESS_RATIO ** np.array([-1.0, 0.0, 1.0, 0.0, 0.0])
     temperatures = r.temperature * TEMPERATURE_RATIO ** np.array([0.0, 0.0, 0.0, -1.0, 1.0])
@@ -116,11 +116,10 @@ def state_at_strain(fit: Identification) -> StateAtStrain | None:
         with np.errstate(divide="ignore", invalid="ignore"):
             log_times = np.log(reached.times)
             log_rates = np.log(reached.log_time_derivatives) - log_times
-        if shares.size > 2:
-            least = np.where(np.isfinite(log_rates), log_rates, np.inf).argmin(axis=-1)[..., None]
-        else:
-            least = np.ones((*log_rates.shape[:-1], 1), int)
-        log_time, log_rate = (np.take_along_axis(v, least, axis=-1)[..., 0] for v in (log_times, log_rates))
+        log_time, log_rate = log_times[..., -1], log_rates[..., -1]
+        if is_least:
+            place = np.where(np.isfinite(log_rates), log_rates, np.inf).argmin(axis=-1)[..., None]
+            log_time, log_rate = (np.take_along_axis(v, place, axis=-1)[..., 0] for v in (log_times, log_rates))
         exponent = (log_rate[:, 2] - log_rate[:, 0]) / (2 * np.log(STRESS_RATIO))
         energy = GAS_CONSTANT * (log_rate[:, 4] - log_rate[:, 3]) / -np.diff(1.0 / temperatures[3:])
         return np.stack([log_time[:, 1], log_rate[:, 1], exponent, energy], axis=-1).reshape(*theta.shape[:-1], 4)

@@ -443,6 +443,9 @@ def _scatter_of_lives(problem: LeastSquaresProblem, linear: LinearisedProblem, n
     if not noise.life > 0.0 or residuals.log_life_sensitivity is None:
         return None
     lives, rates = residuals.log_life_sensitivity, residuals.log_rate_sensitivity
+    # errors of rates that tests state stay with rates
+    stated = [] if residuals.rate_errors is None else [residuals.rate_errors[:, None] * rates]
+    residuals = replace(residuals.with_effects(stated), rate_errors=None)
     residuals = replace(residuals, log_rate_sensitivity=lives, log_life_sensitivity=rates)
     noise = replace(noise, rate=noise.life, life=noise.rate)
     return replace(rate_scatter(problem, replace(linear, residuals=residuals), noise), members={}, known=None)
